@@ -1,0 +1,114 @@
+"""What a simulation returns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.scene import Scene
+
+Array = NDArray[np.float64]
+
+
+class Outcome(StrEnum):
+    """How a run ended.  `FAILED` is numerical and says nothing about the physics."""
+
+    BOUND = "bound"
+    END_TO_END = "end-to-end"
+    SEPARATED = "separated"
+    EQUILIBRIUM = "equilibrium"
+    STEADY = "steady"
+    UNDECIDED = "undecided"
+    FAILED = "failed"
+
+
+@dataclass(frozen=True)
+class Viscosity:
+    """Intrinsic viscosity averaged over time (DESIGN: −∫ f_x y ds / (rate·area))."""
+
+    total: float
+    bending_tension: float
+    adhesion: float
+
+
+@dataclass(frozen=True)
+class Energy:
+    """Energies at the end: bending ½κ∫curvature² ds over all vesicles, adhesion over all pairs."""
+
+    bending: float
+    adhesion: float | None
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Measured error indicators, worst over the run.
+
+    area : relative drift of a vesicle's area.
+    closure : |∫(cos θ, sin θ) ds| / length.
+    temporal : accumulated local error of the state.
+    spatial : amplitude (radians) of the last third of the tangent angle's spectrum.
+    """
+
+    area: float
+    closure: float
+    temporal: float
+    spatial: float
+
+
+@dataclass(frozen=True)
+class Work:
+    """What the run cost."""
+
+    steps: int
+    rejected_steps: int
+    rhs_evaluations: int
+    jacobian_evaluations: int
+    factorizations: int
+    wall_seconds: float
+
+
+# Diagnostics by name, each of shape (time,) and sampled at `Series["time"]`.  Always present: time, bending_energy,
+# area_error, closure_error.  With two or more vesicles: gap.  With exactly two: center_distance,
+# center_angle (of the line of centers, radians, unwrapped).  With adhesion: adhesion_energy.  In shear:
+# viscosity_bending_tension and, with adhesion, viscosity_adhesion.  One vesicle: inclination_angle (radians).
+Series = Mapping[str, Array]
+
+
+@dataclass(frozen=True)
+class Frames:
+    """Recorded states.
+
+    time : (frames,)
+    tangent_angle : (frames, vesicles, points)
+    center : (frames, vesicles, 2)
+    tension : (frames, vesicles, points)
+    """
+
+    time: Array
+    tangent_angle: Array
+    center: Array
+    tension: Array
+
+
+@dataclass(frozen=True)
+class Run:
+    """A finished simulation.  Quantities that the scene does not have are None."""
+
+    scene: Scene
+    outcome: Outcome
+    failure: str | None
+    time: float
+    period: float | None
+    effective_aspect_ratio: float | None
+    inclination_angle: float | None  # degrees
+    gap: float | None
+    viscosity: Viscosity | None
+    energy: Energy
+    error: Errors
+    work: Work
+    series: Series
+    frames: Frames
