@@ -7,9 +7,13 @@ viscosity 1; a length of 2π and a bending modulus of 1 are the defaults of a ve
 from __future__ import annotations
 
 import math
+from itertools import combinations
 from typing import Annotated, Literal, Self
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from solver.shapes import semi_axes
 
 Positive = Annotated[float, Field(gt=0)]
 NonNegative = Annotated[float, Field(ge=0)]
@@ -29,6 +33,22 @@ class Vesicle(Model):
     bending_modulus: Positive = 1.0
     center: tuple[float, float] = (0.0, 0.0)
     angle: float = math.pi / 2  # of the long axis against x, radians
+
+
+def ellipses_overlap(first: Vesicle, second: Vesicle, samples: int = 720) -> bool:
+    """Whether the starting ellipses of two vesicles touch or overlap, seen at ``samples`` points of each."""
+    return _reaches_into(first, second, samples) or _reaches_into(second, first, samples)
+
+
+def _reaches_into(first: Vesicle, second: Vesicle, samples: int) -> bool:
+    """Whether a boundary point of ``first`` lies in ``second``."""
+    alpha = np.linspace(0, 2 * np.pi, samples, endpoint=False)
+    major, minor = semi_axes(first.reduced_area, first.length)
+    axis = np.exp(1j * first.angle)
+    boundary = complex(*first.center) + axis * (major * np.cos(alpha) + 1j * minor * np.sin(alpha))
+    major, minor = semi_axes(second.reduced_area, second.length)
+    inside = (boundary - complex(*second.center)) * np.exp(-1j * second.angle)
+    return bool(np.any((inside.real / major) ** 2 + (inside.imag / minor) ** 2 <= 1))
 
 
 class Adhesion(Model):
@@ -87,6 +107,7 @@ class Numerics(Model):
     points: int = Field(64, ge=16, le=1024, multiple_of=2)  # on each vesicle
     tolerance: float = Field(1e-4, ge=1e-12, le=0.1)  # local error of tangent angle and center, absolute
     integrator: Literal["bdf"] = "bdf"
+    work_limit: int = Field(1_000_000, ge=1)  # evaluations after which a run is given up
 
 
 class Criteria(Model):
@@ -118,3 +139,19 @@ class Scene(Model):
     numerics: Numerics = Numerics()
     criteria: Criteria = Criteria()
     output: Output = Output()
+
+    @model_validator(mode="after")
+    def _apart(self) -> Self:
+        for (i, first), (j, second) in combinations(enumerate(self.vesicles), 2):
+            if ellipses_overlap(first, second):
+                raise ValueError(
+                    f"vesicles {i} and {j} overlap: centers {list(first.center)} and {list(second.center)} "
+                    "must lie farther apart"
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _relaxed_pair(self) -> Self:
+        if self.start.relaxed and len(self.vesicles) != 2:
+            raise ValueError(f"start.relaxed needs exactly 2 vesicles, got {len(self.vesicles)}")
+        return self

@@ -1,0 +1,114 @@
+"""What is measured along a run, and recorded at equal intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver import curve, scene
+from solver.dynamics import Dynamics, Motion
+from solver.orbit import Orbit
+from solver.proximity import gap
+from solver.rheology import membrane_stress, shear_stress
+from solver.run import Frames, Series
+from solver.spectral import tail
+
+Array = NDArray[np.float64]
+Measure = Callable[[Motion], float]
+
+
+def areas(motion: Motion) -> Array:
+    """Area of each vesicle, (M,)."""
+    geometry = motion.geometry
+    points, tangents = geometry.points, geometry.tangents
+    return 0.5 * geometry.membranes.length * np.mean(points[0] * tangents[1] - points[1] * tangents[0], axis=1)
+
+
+def steady_speed(motion: Motion) -> float:
+    """Largest normal speed of any membrane point in the frame that moves with the vesicles' mean.
+
+    Zero exactly when all shapes and the arrangement stay; a membrane that only treads is steady.
+    """
+    mean = motion.velocity.mean(axis=(1, 2))
+    relative = motion.velocity - mean[:, None, None]
+    return float(np.max(np.abs(np.sum(relative * motion.geometry.normals, axis=0))))
+
+
+def measures(setting: scene.Scene, dynamics: Dynamics) -> dict[str, Measure]:
+    """The diagnostics that a scene has, by the name of their series."""
+    target_area = np.array([v.reduced_area * v.length**2 / (4 * np.pi) for v in setting.vesicles])
+
+    found: dict[str, Measure] = {
+        "bending_energy": lambda motion: dynamics.bending.energy(motion.geometry),
+        "area_error": lambda motion: float(np.max(np.abs(areas(motion) / target_area - 1))),
+        "closure_error": lambda motion: float(np.max(np.hypot(*motion.geometry.tangents.mean(axis=2)))),
+        "steady_speed": steady_speed,
+    }
+    adhesion = dynamics.adhesion
+    if adhesion:
+        found["adhesion_energy"] = lambda motion: adhesion.energy(motion.geometry)
+    if len(setting.vesicles) > 1:
+        found["gap"] = lambda motion: gap(motion.geometry)
+    else:
+        found["inclination_angle"] = lambda motion: float(curve.inclination(motion.geometry.points[:, 0]))
+    if isinstance(setting.flow, scene.Shear) and setting.flow.rate > 0:
+        scale = 1 / (setting.flow.rate * target_area.sum())
+        found["viscosity_bending_tension"] = lambda motion: scale * membrane_stress(motion)
+        if adhesion:
+            found["viscosity_adhesion"] = lambda motion: scale * shear_stress(
+                motion.geometry,
+                motion.adhesion,  # type: ignore[arg-type]  # present whenever the term is
+            )
+    return found
+
+
+class Recorder:
+    """Collects diagnostics and frames."""
+
+    def __init__(self, setting: scene.Scene, dynamics: Dynamics, orbit: Orbit | None) -> None:
+        self._dynamics = dynamics
+        self._orbit = orbit
+        self._measures = measures(setting, dynamics)
+        self._frame_interval = setting.output.frame_interval
+        self._frames: list[tuple[float, Array, Array, Array]] = []
+        self.values: dict[str, list[float]] = {}
+        self.spatial_error = 0.0
+
+    def record(self, time: float, state: Array, *, keep_frame: bool = False) -> None:
+        """Measure a state, and keep it as a frame if one is due or ``keep_frame`` says so."""
+        motion = self._dynamics.motion(state)
+        self._append("time", time)
+        for name, measure in self._measures.items():
+            self._append(name, measure(motion))
+        if self._orbit:
+            self._append("center_distance", self._orbit.distance_of(state))
+            self._append("center_angle", self._orbit.angle_of(state))
+        membranes = self._dynamics.membranes
+        tangent_angle = membranes.tangent_angle(state)
+        turned = 2 * np.pi * np.arange(membranes.points) / membranes.points
+        self.spatial_error = max(self.spatial_error, float(tail(tangent_angle - turned).max()))
+        if keep_frame or self._frame_is_due(time):
+            self._frames.append((time, tangent_angle, membranes.center(state), motion.tension))
+
+    def _append(self, name: str, value: float) -> None:
+        self.values.setdefault(name, []).append(value)
+
+    def _frame_is_due(self, time: float) -> bool:
+        if not self._frames:
+            return True
+        last = self._frames[-1][0]
+        # Round-off in a multiple of the interval must not skip a frame.
+        return bool(np.floor(time / self._frame_interval + 1e-9) > np.floor(last / self._frame_interval + 1e-9))
+
+    @property
+    def series(self) -> Series:
+        """All diagnostics."""
+        return {name: np.array(values) for name, values in self.values.items()}
+
+    @property
+    def frames(self) -> Frames:
+        """All recorded states."""
+        time, tangent_angle, center, tension = zip(*self._frames, strict=True)
+        return Frames(np.array(time), np.array(tangent_angle), np.array(center), np.array(tension))

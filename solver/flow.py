@@ -1,0 +1,72 @@
+"""Imposed flows.  All are linear: a velocity gradient and, for the trap, a stagnation point that follows."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver import scene
+from solver.geometry import Geometry
+
+Array = NDArray[np.float64]
+
+_SHEAR = np.array([[0.0, 1.0], [0.0, 0.0]])
+_EXTENSION = np.array([[-1.0, 0.0], [0.0, 1.0]])
+
+
+class ImposedFlow(Protocol):
+    """A far-field velocity."""
+
+    def velocity(self, geometry: Geometry) -> Array:
+        """Velocity at the membranes' points, (2, M, N)."""
+
+    def jacobian(self, dx: Array, dy: Array) -> tuple[Array, Array]:
+        """Derivatives of both velocity components, given those of the points, each (MN, state)."""
+
+
+class LinearFlow:
+    """Velocity ∇u·x with a constant gradient, (2, 2)."""
+
+    def __init__(self, gradient: Array) -> None:
+        self.gradient = gradient
+
+    def velocity(self, geometry: Geometry) -> Array:
+        """See `ImposedFlow`."""
+        return np.tensordot(self.gradient, geometry.points, axes=1)
+
+    def jacobian(self, dx: Array, dy: Array) -> tuple[Array, Array]:
+        """See `ImposedFlow`."""
+        (xx, xy), (yx, yy) = self.gradient
+        return xx * dx + xy * dy, yx * dx + yy * dy
+
+
+class TrapFlow:
+    """Velocity ∇u·(x − X), X the mean of the vesicles' centers (a controlled stagnation point)."""
+
+    def __init__(self, gradient: Array) -> None:
+        self.linear = LinearFlow(gradient)
+
+    def velocity(self, geometry: Geometry) -> Array:
+        """See `ImposedFlow`."""
+        stagnation = geometry.centers.mean(axis=1)
+        return self.linear.velocity(geometry) - (self.linear.gradient @ stagnation)[:, None, None]
+
+    def jacobian(self, dx: Array, dy: Array) -> tuple[Array, Array]:
+        """See `ImposedFlow`.
+
+        The points' derivatives have the centers' as their mean, so the mean over all points is that of X.
+        """
+        return self.linear.jacobian(dx - dx.mean(axis=0), dy - dy.mean(axis=0))
+
+
+def imposed_flow(flow: scene.Shear | scene.Extension | scene.Trap) -> ImposedFlow:
+    """The flow that a scene asks for."""
+    match flow:
+        case scene.Shear():
+            return LinearFlow(flow.rate * _SHEAR)
+        case scene.Extension():
+            return LinearFlow(flow.rate * _EXTENSION)
+        case scene.Trap():
+            return TrapFlow(flow.rate * _EXTENSION)

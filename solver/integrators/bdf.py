@@ -1,0 +1,75 @@
+"""Backward differentiation formulas of variable order 1–5, by SciPy.
+
+Shampine & Reichelt, The MATLAB ODE Suite, SIAM J. Sci. Comput. 18 (1997): quasi-constant step size, with the
+NDF modification; the Jacobian is kept until Newton's iteration slows down.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import BDF
+
+from solver.integrators.base import Step, StepFailedError
+
+Array = NDArray[np.float64]
+
+
+class BackwardDifferentiation:
+    """BDF with an absolute tolerance on every component of the state.
+
+    Tangent angles grow without bound while a membrane treads, so a tolerance relative to them would loosen
+    with time and depend on the frame.
+    """
+
+    def __init__(
+        self,
+        rate: Callable[[Array], Array],
+        jacobian: Callable[[Array], Array],
+        state: Array,
+        tolerance: float,
+        end: float,
+    ) -> None:
+        self._bdf = BDF(
+            lambda _, y: rate(y),
+            0.0,
+            state,
+            end,
+            # SciPy derives Newton's tolerance from rtol, so it is given here and taken back below.
+            rtol=tolerance,
+            atol=tolerance,
+            jac=lambda _, y: jacobian(y),
+        )
+        self._bdf.rtol = 0.0
+
+    @property
+    def jacobian_evaluations(self) -> int:
+        """Number of Jacobians made."""
+        return int(self._bdf.njev)
+
+    @property
+    def factorizations(self) -> int:
+        """Number of matrices factorized."""
+        return int(self._bdf.nlu)
+
+    def step(self) -> Step:
+        """See `Integrator`."""
+        bdf = self._bdf
+        start, intended, order = bdf.t, bdf.h_abs, bdf.order
+        predictor = bdf.dense_output() if bdf.t_old is not None else None
+        message = bdf.step()
+        if bdf.status == "failed":
+            raise StepFailedError(message)
+        change = bdf.y - predictor(bdf.t) if predictor else bdf.y - bdf.dense_output()(start)
+        if not np.all(np.isfinite(bdf.y)):
+            raise StepFailedError("the state is no longer finite")
+        return Step(
+            start=start,
+            end=bdf.t,
+            state=bdf.y,
+            interpolate=bdf.dense_output(),
+            local_error=float(bdf.error_const[order] * np.sqrt(np.mean(change**2))),
+            shortened=bool(bdf.t - start < 0.999 * min(intended, bdf.t_bound - start)),
+        )

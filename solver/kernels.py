@@ -1,0 +1,253 @@
+"""Pairwise sums over membrane points, compiled.
+
+Every function here is a plain double loop whose inner loop LLVM turns into SIMD code.  That needs two
+things: ``error_model="numpy"`` (no branch for a division by zero) and a logarithm without a call, computed
+from the number's bits.
+"""
+
+from __future__ import annotations
+
+from functools import cache, partial
+from typing import NamedTuple
+
+import numpy as np
+from llvmlite import ir
+from numba import njit, types
+from numba.extending import intrinsic
+
+# Without "ninf" and "nnan": a run that diverges must show it.
+compiled = partial(
+    njit, cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz", "arcp"}
+)
+
+
+@intrinsic
+def _bits_of(typing_context, value):  # type: ignore[no-untyped-def]
+    """The 64 bits of a double, as an integer."""
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        return builder.bitcast(arguments[0], ir.IntType(64))
+
+    return types.int64(types.float64), generate
+
+
+@intrinsic
+def _double_of(typing_context, bits):  # type: ignore[no-untyped-def]
+    """The double with these 64 bits."""
+
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        return builder.bitcast(arguments[0], ir.DoubleType())
+
+    return types.float64(types.int64), generate
+
+
+_LN2 = float(np.log(2.0))
+_MANTISSA = (1 << 52) - 1
+_SQRT_HALF_BITS = 0x3FE6A09E667F3BCD
+
+
+@compiled(inline="always")
+def logarithm(x):  # type: ignore[no-untyped-def]
+    """Natural logarithm of a positive normal double, to 3e-16.
+
+    x = 2^e·m with m in [√½, √2); log m = 2 artanh(z), z = (m−1)/(m+1), as an odd polynomial: |z| ≤ 0.1716,
+    so the first term left out, 2 z²¹/21, is below 1e-17.
+    """
+    shifted = _bits_of(x) - _SQRT_HALF_BITS
+    exponent = shifted >> 52
+    mantissa = _double_of((shifted & _MANTISSA) + _SQRT_HALF_BITS)
+    z = (mantissa - 1.0) / (mantissa + 1.0)
+    w = z * z
+    series = 1 / 19.0
+    series = series * w + 1 / 17.0
+    series = series * w + 1 / 15.0
+    series = series * w + 1 / 13.0
+    series = series * w + 1 / 11.0
+    series = series * w + 1 / 9.0
+    series = series * w + 1 / 7.0
+    series = series * w + 1 / 5.0
+    series = series * w + 1 / 3.0
+    return exponent * _LN2 + (2.0 * z + 2.0 * z * w * series)
+
+
+@compiled
+def stokeslets(targets, sources, xx, xy, yy):  # type: ignore[no-untyped-def]
+    """Fill the components (m, n) of (−log r I + r⊗r/r²)/4π from ``sources`` (2, n) to ``targets`` (2, m).
+
+    Where a target is its own source the entries are meaningless and the caller's to overwrite.
+    """
+    scale = 1.0 / (4.0 * np.pi)
+    for i in range(targets.shape[1]):
+        xi, yi = targets[0, i], targets[1, i]
+        for j in range(sources.shape[1]):
+            dx = xi - sources[0, j]
+            dy = yi - sources[1, j]
+            r2 = dx * dx + dy * dy
+            inverse = scale / r2
+            isotropic = -0.5 * scale * logarithm(r2)
+            xx[i, j] = isotropic + dx * dx * inverse
+            xy[i, j] = dx * dy * inverse
+            yy[i, j] = isotropic + dy * dy * inverse
+
+
+@compiled
+def complete_self_part(regular_part, diagonal, tangents, first, xx, xy, yy):  # type: ignore[no-untyped-def]
+    """Turn point Stokeslets of one closed curve on itself into its single-layer quadrature.
+
+    Parameters
+    ----------
+    regular_part : (n, n)
+        What Kress's split of the logarithm adds off the diagonal, over 4π (`stokes.SingleLayer`).
+    diagonal : float
+        The whole logarithmic part on the diagonal, over 4π.
+    tangents : (2, n)
+    first : int
+        Where the curve's rows and columns begin in the components.
+    """
+    scale = 1.0 / (4.0 * np.pi)
+    n = tangents.shape[1]
+    for i in range(n):
+        row = first + i
+        for j in range(n):
+            xx[row, first + j] += regular_part[i, j]
+        for j in range(n):
+            yy[row, first + j] += regular_part[i, j]
+        tx, ty = tangents[0, i], tangents[1, i]
+        xx[row, row] = diagonal + scale * tx * tx
+        xy[row, row] = scale * tx * ty
+        yy[row, row] = diagonal + scale * ty * ty
+
+
+@compiled
+def refine_stokeslets(targets, sources, interpolation, rows, first_row, first_column, xx, xy, yy):  # type: ignore[no-untyped-def]
+    """Replace rows of one vesicle's block by those of the refined source, folded back onto its own points.
+
+    Parameters
+    ----------
+    targets : (2, r)
+        The points of ``rows``.
+    sources : (2, factor·n)
+    interpolation : (factor·n, n)
+    rows : (r,)
+        Within the target vesicle, whose rows begin at ``first_row``; the source's columns begin at
+        ``first_column``.
+    xx, xy, yy : (M·n, M·n), written
+    """
+    fine = (targets.shape[1], sources.shape[1])
+    fine_xx, fine_xy, fine_yy = np.empty(fine), np.empty(fine), np.empty(fine)
+    stokeslets(targets, sources, fine_xx, fine_xy, fine_yy)
+    points = interpolation.shape[1]
+    weight = points / sources.shape[1]
+    last_column = first_column + points
+    folded_xx = np.dot(fine_xx, interpolation)
+    folded_xy = np.dot(fine_xy, interpolation)
+    folded_yy = np.dot(fine_yy, interpolation)
+    for k in range(rows.size):
+        row = first_row + rows[k]
+        xx[row, first_column:last_column] = weight * folded_xx[k]
+        xy[row, first_column:last_column] = weight * folded_xy[k]
+        yy[row, first_column:last_column] = weight * folded_yy[k]
+
+
+@compiled
+def distances(targets, sources, tangents, spacing, out):  # type: ignore[no-untyped-def]
+    """Distance of every target (2, m) to the curve through ``sources`` (2, n), to second order in ``spacing``.
+
+    The curve is replaced by its tangent segments of length ``spacing`` at the nearest point.
+    """
+    for i in range(targets.shape[1]):
+        xi, yi = targets[0, i], targets[1, i]
+        nearest = np.inf
+        for j in range(sources.shape[1]):
+            dx = xi - sources[0, j]
+            dy = yi - sources[1, j]
+            nearest = min(nearest, dx * dx + dy * dy)
+        for j in range(sources.shape[1]):
+            dx = xi - sources[0, j]
+            dy = yi - sources[1, j]
+            if dx * dx + dy * dy <= nearest:
+                along = abs(dx * tangents[0, j] + dy * tangents[1, j])
+                inside = min(along, 0.5 * spacing)
+                out[i] = np.sqrt(max(nearest - along * along, 0.0) + (along - inside) ** 2)
+                break
+
+
+class AdhesionKernels(NamedTuple):
+    """Compiled sums for one pair of exponents: see `adhesion_kernels`."""
+
+    force: object
+    energy: object
+    hessian: object
+
+
+@cache
+def adhesion_kernels(m: int, n: int) -> AdhesionKernels:
+    """Sums of the potential (δ/r)^m − (m/n)(δ/r)^n over source points, compiled for constant exponents.
+
+    ``force(targets, sources, distance, scale, out)`` adds scale·Σ (x−y)/r² [(δ/r)^m − (δ/r)^n] to out (2, t);
+    ``energy(targets, sources, distance)`` returns Σ Σ φ; ``hessian(targets, sources, distance, scale, xx, xy, yy)``
+    fills the (t, s) components of the derivative of each pair's force by the target's position.
+    """
+    half_m, half_n = m // 2, n // 2
+    odd_m, odd_n = m % 2, n % 2
+    ratio = m / n
+
+    @compiled
+    def powers(q):  # type: ignore[no-untyped-def]
+        """(δ/r)^m and (δ/r)^n from q = δ²/r²."""
+        high = q**half_m
+        low = q**half_n
+        if odd_m:
+            high *= np.sqrt(q)
+        if odd_n:
+            low *= np.sqrt(q)
+        return high, low
+
+    @compiled
+    def force(targets, sources, distance, scale, out):  # type: ignore[no-untyped-def]
+        square = distance * distance
+        for i in range(targets.shape[1]):
+            xi, yi = targets[0, i], targets[1, i]
+            fx = 0.0
+            fy = 0.0
+            for j in range(sources.shape[1]):
+                dx = xi - sources[0, j]
+                dy = yi - sources[1, j]
+                inverse = 1.0 / (dx * dx + dy * dy)
+                high, low = powers(square * inverse)
+                strength = inverse * (high - low)
+                fx += dx * strength
+                fy += dy * strength
+            out[0, i] += scale * fx
+            out[1, i] += scale * fy
+
+    @compiled
+    def energy(targets, sources, distance):  # type: ignore[no-untyped-def]
+        square = distance * distance
+        total = 0.0
+        for i in range(targets.shape[1]):
+            xi, yi = targets[0, i], targets[1, i]
+            for j in range(sources.shape[1]):
+                dx = xi - sources[0, j]
+                dy = yi - sources[1, j]
+                high, low = powers(square / (dx * dx + dy * dy))
+                total += high - ratio * low
+        return total
+
+    @compiled
+    def hessian(targets, sources, distance, scale, xx, xy, yy):  # type: ignore[no-untyped-def]
+        square = distance * distance
+        for i in range(targets.shape[1]):
+            xi, yi = targets[0, i], targets[1, i]
+            for j in range(sources.shape[1]):
+                dx = xi - sources[0, j]
+                dy = yi - sources[1, j]
+                inverse = 1.0 / (dx * dx + dy * dy)
+                high, low = powers(square * inverse)
+                strength = scale * inverse * (high - low)
+                radial = -scale * inverse * inverse * ((m + 2) * high - (n + 2) * low)
+                xx[i, j] = strength + radial * dx * dx
+                xy[i, j] = radial * dx * dy
+                yy[i, j] = strength + radial * dy * dy
+
+    return AdhesionKernels(force, energy, hessian)

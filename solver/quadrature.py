@@ -1,0 +1,43 @@
+"""How finely a membrane must be sampled for its effect on a nearby point.
+
+The trapezoid rule with spacing h, applied to 1/(s² + d²)^q, misses the integral by the relative amount
+
+    4/Γ(q−½) (z/2)^(q−½) K_(q−½)(z),    z = 2πd/h,
+
+the first alias in Poisson's sum (K: modified Bessel function).  For the Stokeslet (q = 1) this is 2 exp(−z).
+Solved for z it tells, from the measured distance alone, by which factor the source is to be interpolated.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+from scipy.special import gammaln, kve
+
+Array = NDArray[np.float64]
+
+MAXIMUM_FACTOR = 32
+
+
+@cache
+def required_ratio(order: float, tolerance: float) -> float:
+    """Smallest distance/spacing at which the trapezoid rule of 1/(s² + d²)^order is accurate to ``tolerance``."""
+    nu = order - 0.5
+
+    def excess(z: float) -> float:
+        # The scaled Bessel function keeps the exponential out, so that nothing underflows.
+        error = np.log(4.0) - gammaln(nu) + nu * np.log(z / 2) + np.log(kve(nu, z)) - z
+        return float(error - np.log(tolerance))
+
+    lowest = max(nu, 0.1)  # below it the alias is not small and the estimate says nothing
+    return float(brentq(excess, lowest, 1e3)) / (2 * np.pi)
+
+
+def refinement_factors(distance_per_spacing: Array, ratio: float) -> NDArray[np.int64]:
+    """Powers of two by which sources are to be refined so that distance/spacing reaches ``ratio``, at most 32."""
+    needed = ratio / np.maximum(distance_per_spacing, ratio / MAXIMUM_FACTOR)
+    factors: NDArray[np.int64] = 2 ** np.ceil(np.log2(np.maximum(needed, 1.0)) - 1e-9).astype(np.int64)
+    return factors

@@ -1,0 +1,212 @@
+"""The time loop: from a scene to a finished run."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from solver.diagnostics import Recorder
+from solver.dynamics import Dynamics
+from solver.integrators import BackwardDifferentiation, StepFailedError
+from solver.orbit import Orbit
+from solver.outcome import History, criteria_of, latest_time
+from solver.run import Energy, Errors, Outcome, Run, Series, Viscosity, Work
+from solver.scene import Extension, Scene, Shear, Start, Trap
+from solver.start import placed_state, turned_state
+from solver.tension import TensionNotFoundError
+
+Array = NDArray[np.float64]
+
+
+class Cancelled(Exception):  # noqa: N818  an outcome of the caller's own wish, not an error
+    """The caller asked the simulation to stop."""
+
+
+@dataclass
+class _Progress:
+    """What the loop has come to."""
+
+    time: float
+    state: Array
+    steps: int = 0
+    shortened: int = 0
+    temporal_error: float = 0.0
+
+
+def simulate(
+    scene: Scene,
+    *,
+    should_stop: Callable[[], bool] | None = None,
+    on_progress: Callable[[float, float], None] | None = None,
+) -> Run:
+    """Run a scene until its outcome is decided.
+
+    Parameters
+    ----------
+    scene : Scene
+    should_stop : callable, optional
+        Asked after every step; `Cancelled` is raised once it returns true.
+    on_progress : callable, optional
+        Told the time reached and the latest time after every step.
+
+    Returns
+    -------
+    Run
+        A numerical failure is an outcome (`Outcome.FAILED` with its reason), not an exception.
+    """
+    began = clock.perf_counter()
+    dynamics = Dynamics.of(scene)
+    state, evaluations = _initial_state(scene, dynamics, should_stop)
+    orbit = Orbit(dynamics.membranes, state) if len(scene.vesicles) == 2 else None
+    recorder = Recorder(scene, dynamics, orbit)
+    criteria = criteria_of(scene)
+    latest = latest_time(scene)
+    progress = _Progress(0.0, state)
+    outcome, failure = Outcome.UNDECIDED, None
+    integrator = None
+    try:
+        recorder.record(0.0, state)
+        integrator = BackwardDifferentiation(
+            dynamics.rate, dynamics.jacobian, state, scene.numerics.tolerance, latest
+        )
+        while progress.time < latest and outcome is Outcome.UNDECIDED:
+            step = integrator.step()
+            if orbit:
+                orbit.advance(step)
+            _record_up_to(step.end, step.interpolate, recorder, scene.output.interval)
+            progress.time, progress.state = step.end, step.state
+            progress.steps += 1
+            progress.shortened += step.shortened
+            progress.temporal_error += step.local_error
+            history = History(recorder.values, dynamics, orbit, step.state)
+            decisions = (criterion.decide(history) for criterion in criteria)
+            outcome = next((decision for decision in decisions if decision), Outcome.UNDECIDED)
+            if dynamics.evaluations > scene.numerics.work_limit:
+                raise StepFailedError(f"the work limit of {scene.numerics.work_limit} evaluations is reached")
+            if should_stop and should_stop():
+                raise Cancelled
+            if on_progress:
+                on_progress(step.end, latest)
+        recorder.record(progress.time, progress.state, keep_frame=True)
+    except (StepFailedError, TensionNotFoundError, np.linalg.LinAlgError) as error:
+        outcome, failure = Outcome.FAILED, str(error)
+    work = Work(
+        steps=progress.steps,
+        rejected_steps=progress.shortened,
+        rhs_evaluations=evaluations + dynamics.evaluations,
+        jacobian_evaluations=integrator.jacobian_evaluations if integrator else 0,
+        factorizations=integrator.factorizations if integrator else 0,
+        wall_seconds=clock.perf_counter() - began,
+    )
+    return _summary(scene, outcome, failure, progress, orbit, recorder, work)
+
+
+def _initial_state(
+    scene: Scene, dynamics: Dynamics, should_stop: Callable[[], bool] | None
+) -> tuple[Array, int]:
+    """The state to begin with, and the evaluations that finding it took."""
+    if not scene.start.relaxed:
+        return placed_state(scene), 0
+    at_rest = scene.model_copy(update={"flow": None, "start": Start()})
+    relaxed = simulate(at_rest, should_stop=should_stop)
+    last = dynamics.membranes.pack(relaxed.frames.tangent_angle[-1], relaxed.frames.center[-1])
+    return turned_state(dynamics.membranes, last, scene.start.tilt), relaxed.work.rhs_evaluations
+
+
+def _record_up_to(
+    end: float, interpolate: Callable[[float], Array], recorder: Recorder, interval: float
+) -> None:
+    """Record all multiples of ``interval`` that the last step has passed."""
+    recorded = round(recorder.values["time"][-1] / interval)
+    for index in range(recorded + 1, int(np.floor(end / interval)) + 1):
+        recorder.record(index * interval, interpolate(index * interval))
+
+
+def _summary(
+    scene: Scene,
+    outcome: Outcome,
+    failure: str | None,
+    progress: _Progress,
+    orbit: Orbit | None,
+    recorder: Recorder,
+    work: Work,
+) -> Run:
+    series = recorder.series
+    period = orbit.period if orbit and isinstance(scene.flow, Shear) else None
+    adhesion_energy = series.get("adhesion_energy")
+    return Run(
+        scene=scene,
+        outcome=outcome,
+        failure=failure,
+        time=progress.time,
+        period=period,
+        effective_aspect_ratio=_effective_aspect_ratio(period, scene),
+        inclination_angle=_inclination(scene, series),
+        gap=_last(series, "gap"),
+        viscosity=_viscosity(series, outcome, orbit),
+        energy=Energy(
+            bending=float(series["bending_energy"][-1]),
+            adhesion=None if adhesion_energy is None else float(adhesion_energy[-1]),
+        ),
+        error=Errors(
+            area=float(series["area_error"].max()),
+            closure=float(series["closure_error"].max()),
+            temporal=progress.temporal_error,
+            spatial=recorder.spatial_error,
+        ),
+        work=work,
+        series=series,
+        frames=recorder.frames,
+    )
+
+
+def _last(series: Series, name: str) -> float | None:
+    return float(series[name][-1]) if name in series else None
+
+
+def _effective_aspect_ratio(period: float | None, scene: Scene) -> float | None:
+    """Aspect ratio λ ≥ 1 of the rigid ellipse with this period, p = 2π/rate·(λ + 1/λ) (paper, eq. 9)."""
+    if period is None or not isinstance(scene.flow, Shear):
+        return None
+    half_sum = period * scene.flow.rate / (4 * np.pi)
+    return float(half_sum + np.sqrt(half_sum**2 - 1)) if half_sum >= 1 else None
+
+
+def _inclination(scene: Scene, series: Series) -> float | None:
+    """Degrees: of the long axis of a single vesicle against x, or of a trapped pair as the paper defines it.
+
+    For the pair it is 180° when the line of centers lies on the diverging axis and 90° when it lies on the
+    converging one (paper, figure 6).
+    """
+    if "inclination_angle" in series:
+        return float(np.degrees(series["inclination_angle"][-1]))
+    if isinstance(scene.flow, Extension | Trap) and "center_angle" in series:
+        return 90 + float(np.degrees(np.arcsin(abs(np.sin(series["center_angle"][-1])))))
+    return None
+
+
+def _viscosity(series: Series, outcome: Outcome, orbit: Orbit | None) -> Viscosity | None:
+    """Average over the last full turn of a pair, or the value in the steady state; None while neither exists."""
+    if "viscosity_bending_tension" not in series:
+        return None
+    if outcome is Outcome.STEADY:
+
+        def average(name: str) -> float:
+            return float(series[name][-1])
+
+    elif orbit and orbit.period:
+        first, last = orbit.half_turns[-3], orbit.half_turns[-1]
+
+        def average(name: str) -> float:
+            return float(CubicSpline(series["time"], series[name]).integrate(first, last)) / (last - first)
+
+    else:
+        return None
+    membrane = average("viscosity_bending_tension")
+    adhesion = average("viscosity_adhesion") if "viscosity_adhesion" in series else 0.0
+    return Viscosity(total=membrane + adhesion, bending_tension=membrane, adhesion=adhesion)

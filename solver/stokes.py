@@ -1,0 +1,84 @@
+"""The single-layer potential of Stokes flow over all membranes (paper, appendix A):
+
+S f(x) = 1/(4π) ∫ (−log r I + r⊗r/r²) f ds,  r = x − y  (viscosity 1).
+
+On its own vesicle the logarithm is split after Kress, ½ log(4 sin²) being integrated exactly; on another
+vesicle the trapezoid rule is used, on refined sources where the target is close (`proximity`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver import kernels
+from solver.geometry import Geometry, Membranes
+from solver.proximity import Refinement
+from solver.spectral import logarithm_weights
+
+Array = NDArray[np.float64]
+
+
+class SingleLayer:
+    """Discrete single-layer potential, kept as its three components.
+
+    The components act on point forces, that is force densities times the spacing, and are then symmetric
+    up to quadrature error.
+
+    Attributes
+    ----------
+    xx, xy, yy : (M·N, M·N)
+        Filled by `assemble`.
+    """
+
+    def __init__(self, membranes: Membranes) -> None:
+        points = membranes.points
+        size = membranes.count * points
+        self.xx, self.xy, self.yy = np.zeros((3, size, size))
+        alpha = 2 * np.pi * np.arange(points) / points
+        sine = np.sin((alpha[:, None] - alpha) / 2)
+        np.fill_diagonal(sine, 0.5)  # makes the logarithm vanish there
+        weights = logarithm_weights(points) * points / (2 * np.pi)
+        self._regular_part = (0.5 * np.log(4 * sine**2) + weights) / (4 * np.pi)
+        # On the diagonal r²/(4 sin²) tends to (length/2π)².
+        self._diagonal = (weights[0, 0] - np.log(membranes.length / (2 * np.pi))) / (4 * np.pi)
+
+    def assemble(self, geometry: Geometry, refinements: Iterable[Refinement]) -> None:
+        """Fill the components for this geometry."""
+        points = geometry.membranes.points
+        all_points = geometry.points.reshape(2, -1)
+        kernels.stokeslets(all_points, all_points, self.xx, self.xy, self.yy)
+        for vesicle in range(geometry.membranes.count):
+            kernels.complete_self_part(
+                self._regular_part,
+                self._diagonal[vesicle],
+                geometry.tangents[:, vesicle],
+                vesicle * points,
+                self.xx,
+                self.xy,
+                self.yy,
+            )
+        for near in refinements:
+            kernels.refine_stokeslets(
+                near.targets,
+                near.sources,
+                near.interpolation,
+                near.rows,
+                near.target * points,
+                near.source * points,
+                self.xx,
+                self.xy,
+                self.yy,
+            )
+
+    def velocity(self, point_forces: Array) -> Array:
+        """Velocity (2, M, N) that point forces (2, M, N) cause at the membranes' points."""
+        return np.stack(self.columns(point_forces[0].ravel(), point_forces[1].ravel())).reshape(
+            point_forces.shape
+        )
+
+    def columns(self, fx: Array, fy: Array) -> tuple[Array, Array]:
+        """Velocity components for several point forces at once, (M·N, ...) each."""
+        return self.xx @ fx + self.xy @ fy, self.xy @ fx + self.yy @ fy
