@@ -7,7 +7,6 @@ has the opposite sign.)
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import combinations, permutations
 
 import numpy as np
@@ -15,50 +14,50 @@ from numpy.typing import NDArray
 
 from solver import scene
 from solver.geometry import Geometry
-from solver.kernels import adhesion_kernels
-from solver.proximity import Refinement
+from solver.kernels import adhesion_energy, adhesion_force, adhesion_hessian
+from solver.proximity import Closeness
+from solver.quadrature import required_ratio
 from solver.spectral import interpolation
 
 Array = NDArray[np.float64]
 
 
 class Adhesion:
-    """Adhesion over all pairs of vesicles."""
+    """Adhesion over all pairs of vesicles.
 
-    def __init__(self, parameters: scene.Adhesion) -> None:
-        self.parameters = parameters
-        self._kernels = adhesion_kernels(*parameters.exponents)
+    Parameters
+    ----------
+    parameters : scene.Adhesion
+    accuracy : float
+        Relative error allowed in the force between two nearly parallel membranes.
+    """
 
-    @property
-    def order(self) -> float:
-        """Order q of the force kernel, ~1/(s² + d²)^q over a nearly straight membrane (`quadrature`)."""
-        return 0.5 * (self.parameters.exponents[0] + 2)
+    def __init__(self, parameters: scene.Adhesion, accuracy: float) -> None:
+        m, n = parameters.exponents
+        self._potential = parameters.distance, m, n
+        self._hamaker = parameters.hamaker
+        # Over a nearly straight membrane the force kernel is like 1/(s² + d²)^(m/2 + 1).
+        self._ratio = required_ratio(0.5 * m + 1, accuracy)
 
-    @property
-    def _strength(self) -> float:
-        return self.parameters.hamaker * self.parameters.exponents[0]
-
-    def density(self, geometry: Geometry, refinements: Sequence[Refinement]) -> Array:
+    def density(self, geometry: Geometry, closeness: Closeness) -> Array:
         """Force per length, (2, M, N)."""
         points, spacing = geometry.points, geometry.membranes.spacing
+        strength = self._hamaker * self._potential[1]
         density = np.zeros_like(points)
-        contiguous = [np.ascontiguousarray(points[:, vesicle]) for vesicle in range(len(spacing))]
+        force = np.empty((2, geometry.membranes.points))
         for target, source in permutations(range(len(spacing)), 2):
-            force = np.zeros((2, geometry.membranes.points))
-            self._force(contiguous[target], contiguous[source], spacing[source], force)
-            for near in refinements:
-                if (near.target, near.source) == (target, source):
-                    refined = np.zeros_like(near.targets)
-                    self._force(near.targets, near.sources, spacing[source] / near.factor, refined)
-                    force[:, near.rows] = refined
+            targets, sources = points[:, target], points[:, source]
+            adhesion_force(targets, sources, *self._potential, strength * spacing[source], force)
+            for near in closeness.refinements(target, source, self._ratio):
+                refined = np.empty_like(near.targets)
+                scale = strength * spacing[source] / near.factor
+                adhesion_force(near.targets, near.sources, *self._potential, scale, refined)
+                force[:, near.rows] = refined
             density[:, target] += force
         return density
 
-    def _force(self, targets: Array, sources: Array, spacing: float, out: Array) -> None:
-        self._kernels.force(targets, sources, self.parameters.distance, self._strength * spacing, out)
-
     def jacobian(
-        self, geometry: Geometry, refinements: Sequence[Refinement], dx: Array, dy: Array
+        self, geometry: Geometry, closeness: Closeness, dx: Array, dy: Array
     ) -> tuple[Array, Array]:
         """Derivatives of both components by the state, (M·N, state) each, given those of the points."""
         membranes = geometry.membranes
@@ -68,16 +67,15 @@ class Adhesion:
         for target, source in permutations(range(membranes.count), 2):
             rows = slice(target * points, (target + 1) * points)
             columns = slice(source * points, (source + 1) * points)
-            targets = np.ascontiguousarray(geometry.points[:, target])
-            sources = np.ascontiguousarray(geometry.points[:, source])
-            pair = self._hessian(targets, sources, membranes.spacing[source])
+            pair = self._hessian(
+                geometry.points[:, target], geometry.points[:, source], membranes.spacing[source]
+            )
             own = pair.sum(axis=-1)
-            for near in refinements:
-                if (near.target, near.source) == (target, source):
-                    fine = self._hessian(near.targets, near.sources, membranes.spacing[source] / near.factor)
-                    own[:, near.rows] = fine.sum(axis=-1)
-                    pair[:, near.rows] = fine @ near.interpolation
-            hessian[:, rows, columns] = -pair
+            for near in closeness.refinements(target, source, self._ratio):
+                fine = self._hessian(near.targets, near.sources, membranes.spacing[source] / near.factor)
+                own[:, near.rows] = fine.sum(axis=-1)
+                pair[:, near.rows] = fine @ near.interpolation
+            np.negative(pair, out=hessian[:, rows, columns])
             diagonal = np.arange(rows.start, rows.stop)
             hessian[:, diagonal, diagonal] += own
         xx, xy, yy = hessian
@@ -85,22 +83,16 @@ class Adhesion:
 
     def _hessian(self, targets: Array, sources: Array, spacing: float) -> Array:
         components = np.empty((3, targets.shape[1], sources.shape[1]))
-        self._kernels.hessian(
-            targets, sources, self.parameters.distance, self._strength * spacing, *components
-        )
+        scale = self._hamaker * self._potential[1] * spacing
+        adhesion_hessian(targets, sources, *self._potential, scale, *components)
         return components
 
     def energy(self, geometry: Geometry, refinement: int = 2) -> float:
         """∫∫ φ ds ds summed over all pairs, on points interpolated ``refinement`` times."""
-        matrix = interpolation(geometry.membranes.points, refinement)
-        points = geometry.points @ matrix.T
+        points = geometry.points @ interpolation(geometry.membranes.points, refinement).T
         spacing = geometry.membranes.spacing / refinement
         total = 0.0
         for first, second in combinations(range(len(spacing)), 2):
-            pair = self._kernels.energy(
-                np.ascontiguousarray(points[:, first]),
-                np.ascontiguousarray(points[:, second]),
-                self.parameters.distance,
-            )
+            pair = adhesion_energy(points[:, first], points[:, second], *self._potential)
             total += spacing[first] * spacing[second] * pair
-        return self.parameters.hamaker * total
+        return self._hamaker * total

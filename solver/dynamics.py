@@ -19,8 +19,7 @@ from solver.adhesion import Adhesion
 from solver.bending import Bending
 from solver.flow import ImposedFlow, imposed_flow
 from solver.geometry import Geometry, Membranes
-from solver.proximity import Proximity, Refinement
-from solver.quadrature import required_ratio
+from solver.proximity import Closeness
 from solver.scene import Scene
 from solver.spectral import differentiation, integration
 from solver.stokes import SingleLayer
@@ -47,14 +46,13 @@ class Motion:
 class Dynamics:
     """Right-hand side and Jacobian of the equation of motion.
 
-    ``proximity`` is None for a single vesicle, ``adhesion`` and ``flow`` for a scene without.
+    ``adhesion`` and ``flow`` are None for a scene without.
     """
 
     membranes: Membranes
     bending: Bending
     adhesion: Adhesion | None
     flow: ImposedFlow | None
-    proximity: Proximity | None
     inextensibility: Inextensibility
     layer: SingleLayer
     evaluations: int = field(default=0, init=False)
@@ -64,33 +62,36 @@ class Dynamics:
         """The terms of a scene."""
         membranes = Membranes.of(scene.vesicles, scene.numerics.points)
         several = membranes.count > 1
-        adhesion = Adhesion(scene.adhesion) if scene.adhesion and several else None
-        # Far below the time integrator's tolerance, so that neither sum limits its step.
-        accuracy = float(np.clip(1e-4 * scene.numerics.tolerance, 1e-12, 1e-8))
-        order = adhesion.order if adhesion else 1.0
+        # Below the time integrator's tolerance, so that neither sums nor iterations limit its step.
+        quadrature = float(np.clip(1e-3 * scene.numerics.tolerance, 1e-12, 1e-7))
+        iteration = float(np.clip(1e-4 * scene.numerics.tolerance, 1e-12, 1e-8))
         return cls(
             membranes=membranes,
             bending=Bending(),
-            adhesion=adhesion,
+            adhesion=Adhesion(scene.adhesion, quadrature) if scene.adhesion and several else None,
             flow=imposed_flow(scene.flow) if scene.flow else None,
-            proximity=Proximity(required_ratio(order, accuracy)) if several else None,
-            inextensibility=Inextensibility(accuracy),
-            layer=SingleLayer(membranes),
+            inextensibility=Inextensibility(iteration),
+            layer=SingleLayer(membranes, quadrature),
         )
 
     def motion(self, state: Array) -> Motion:
         """Velocity, tension and forces in a state."""
         self.evaluations += 1
-        geometry, refinements = self._assemble(state)
+        geometry, closeness = self._assemble(state)
         bending = self.bending.density(geometry)
-        adhesion = self.adhesion.density(geometry, refinements) if self.adhesion else None
-        density = bending if adhesion is None else bending + adhesion
+        density = bending
+        adhesion = None
+        if self.adhesion and closeness:
+            adhesion = self.adhesion.density(geometry, closeness)
+            density = bending + adhesion
         velocity = self.layer.velocity(density * self.membranes.spacing[:, None])
         if self.flow:
             velocity += self.flow.velocity(geometry)
-        stretching = np.sum(geometry.tangents * geometry.arclength_derivative(velocity), axis=0)
+        gradient = geometry.arclength_derivative(velocity)
+        stretching = geometry.tangents[0] * gradient[0] + geometry.tangents[1] * gradient[1]
         tension, correction = self.inextensibility.solve(self.layer, geometry, stretching)
-        return Motion(geometry, velocity + correction, tension, bending, adhesion)
+        velocity += correction
+        return Motion(geometry, velocity, tension, bending, adhesion)
 
     def rate(self, state: Array) -> Array:
         """d(state)/dt."""
@@ -110,11 +111,11 @@ class Dynamics:
         Shape (state_size, state_size).  Dropped are the derivatives of S, of the tension's direction and of
         the constraint; kept are those of all forces and of the flow, which carry the stiffness.
         """
-        geometry, refinements = self._assemble(state)
+        geometry, closeness = self._assemble(state)
         dx, dy = self._point_derivatives(geometry)
         force_x, force_y = self.bending.jacobian(geometry, dx, dy)
-        if self.adhesion:
-            adhesion_x, adhesion_y = self.adhesion.jacobian(geometry, refinements, dx, dy)
+        if self.adhesion and closeness:
+            adhesion_x, adhesion_y = self.adhesion.jacobian(geometry, closeness, dx, dy)
             force_x += adhesion_x
             force_y += adhesion_y
         weights = np.repeat(self.membranes.spacing, self.membranes.points)[:, None]
@@ -131,11 +132,11 @@ class Dynamics:
         uy += tension_y @ tension
         return self._rate_columns(geometry, ux, uy)
 
-    def _assemble(self, state: Array) -> tuple[Geometry, list[Refinement]]:
+    def _assemble(self, state: Array) -> tuple[Geometry, Closeness | None]:
         geometry = Geometry(self.membranes, state)
-        refinements = self.proximity.refinements(geometry) if self.proximity else []
-        self.layer.assemble(geometry, refinements)
-        return geometry, refinements
+        closeness = Closeness(geometry) if self.membranes.count > 1 else None
+        self.layer.assemble(geometry, closeness)
+        return geometry, closeness
 
     def _point_derivatives(self, geometry: Geometry) -> tuple[Array, Array]:
         """Derivatives of the points' coordinates by the state, (M·N, state) each."""

@@ -7,8 +7,7 @@ from the number's bits.
 
 from __future__ import annotations
 
-from functools import cache, partial
-from typing import NamedTuple
+from functools import partial
 
 import numpy as np
 from llvmlite import ir
@@ -172,82 +171,96 @@ def distances(targets, sources, tangents, spacing, out):  # type: ignore[no-unty
                 break
 
 
-class AdhesionKernels(NamedTuple):
-    """Compiled sums for one pair of exponents: see `adhesion_kernels`."""
+@compiled
+def pair_distances(points, tangents, spacing, out):  # type: ignore[no-untyped-def]
+    """`distances` for all ordered pairs: out[a, b, i] is that of point i of vesicle a to vesicle b.
 
-    force: object
-    energy: object
-    hessian: object
-
-
-@cache
-def adhesion_kernels(m: int, n: int) -> AdhesionKernels:
-    """Sums of the potential (δ/r)^m − (m/n)(δ/r)^n over source points, compiled for constant exponents.
-
-    ``force(targets, sources, distance, scale, out)`` adds scale·Σ (x−y)/r² [(δ/r)^m − (δ/r)^n] to out (2, t);
-    ``energy(targets, sources, distance)`` returns Σ Σ φ; ``hessian(targets, sources, distance, scale, xx, xy, yy)``
-    fills the (t, s) components of the derivative of each pair's force by the target's position.
+    points, tangents : (2, M, N); spacing : (M,); out : (M, M, N), its diagonal left alone
     """
-    half_m, half_n = m // 2, n // 2
-    odd_m, odd_n = m % 2, n % 2
+    for target in range(points.shape[1]):
+        for source in range(points.shape[1]):
+            if target != source:
+                distances(
+                    points[:, target],
+                    points[:, source],
+                    tangents[:, source],
+                    spacing[source],
+                    out[target, source],
+                )
+
+
+@compiled(inline="always")
+def _powers(dx, dy, square, m, n, inverse, high, low):  # type: ignore[no-untyped-def]
+    """Write 1/r², (δ/r)^m and (δ/r)^n for offsets (dx, dy) of one row, δ² = ``square``.
+
+    The exponents are known only at run time, so each multiplication is a loop of its own over the row.
+    """
+    for j in range(dx.size):
+        inverse[j] = 1.0 / (dx[j] * dx[j] + dy[j] * dy[j])
+        low[j] = 1.0
+    for _ in range(n // 2):
+        for j in range(dx.size):
+            low[j] *= square * inverse[j]
+    for j in range(dx.size):
+        high[j] = low[j]
+    for _ in range(m // 2 - n // 2):
+        for j in range(dx.size):
+            high[j] *= square * inverse[j]
+    if n % 2 == 1:
+        for j in range(dx.size):
+            low[j] *= np.sqrt(square * inverse[j])
+    if m % 2 == 1:
+        for j in range(dx.size):
+            high[j] *= np.sqrt(square * inverse[j])
+
+
+@compiled
+def adhesion_force(targets, sources, distance, m, n, scale, out):  # type: ignore[no-untyped-def]
+    """Write scale·Σ (x−y)/r² [(δ/r)^m − (δ/r)^n] over ``sources`` (2, s) to out (2, t) for ``targets`` (2, t)."""
+    dx, dy, inverse, high, low = np.empty((5, sources.shape[1]))
+    for i in range(targets.shape[1]):
+        for j in range(sources.shape[1]):
+            dx[j] = targets[0, i] - sources[0, j]
+            dy[j] = targets[1, i] - sources[1, j]
+        _powers(dx, dy, distance * distance, m, n, inverse, high, low)
+        fx = 0.0
+        fy = 0.0
+        for j in range(sources.shape[1]):
+            strength = inverse[j] * (high[j] - low[j])
+            fx += dx[j] * strength
+            fy += dy[j] * strength
+        out[0, i] = scale * fx
+        out[1, i] = scale * fy
+
+
+@compiled
+def adhesion_energy(targets, sources, distance, m, n):  # type: ignore[no-untyped-def]
+    """Σ Σ (δ/r)^m − (m/n)(δ/r)^n over ``targets`` (2, t) and ``sources`` (2, s)."""
+    dx, dy, inverse, high, low = np.empty((5, sources.shape[1]))
     ratio = m / n
+    total = 0.0
+    for i in range(targets.shape[1]):
+        for j in range(sources.shape[1]):
+            dx[j] = targets[0, i] - sources[0, j]
+            dy[j] = targets[1, i] - sources[1, j]
+        _powers(dx, dy, distance * distance, m, n, inverse, high, low)
+        for j in range(sources.shape[1]):
+            total += high[j] - ratio * low[j]
+    return total
 
-    @compiled
-    def powers(q):  # type: ignore[no-untyped-def]
-        """(δ/r)^m and (δ/r)^n from q = δ²/r²."""
-        high = q**half_m
-        low = q**half_n
-        if odd_m:
-            high *= np.sqrt(q)
-        if odd_n:
-            low *= np.sqrt(q)
-        return high, low
 
-    @compiled
-    def force(targets, sources, distance, scale, out):  # type: ignore[no-untyped-def]
-        square = distance * distance
-        for i in range(targets.shape[1]):
-            xi, yi = targets[0, i], targets[1, i]
-            fx = 0.0
-            fy = 0.0
-            for j in range(sources.shape[1]):
-                dx = xi - sources[0, j]
-                dy = yi - sources[1, j]
-                inverse = 1.0 / (dx * dx + dy * dy)
-                high, low = powers(square * inverse)
-                strength = inverse * (high - low)
-                fx += dx * strength
-                fy += dy * strength
-            out[0, i] += scale * fx
-            out[1, i] += scale * fy
-
-    @compiled
-    def energy(targets, sources, distance):  # type: ignore[no-untyped-def]
-        square = distance * distance
-        total = 0.0
-        for i in range(targets.shape[1]):
-            xi, yi = targets[0, i], targets[1, i]
-            for j in range(sources.shape[1]):
-                dx = xi - sources[0, j]
-                dy = yi - sources[1, j]
-                high, low = powers(square / (dx * dx + dy * dy))
-                total += high - ratio * low
-        return total
-
-    @compiled
-    def hessian(targets, sources, distance, scale, xx, xy, yy):  # type: ignore[no-untyped-def]
-        square = distance * distance
-        for i in range(targets.shape[1]):
-            xi, yi = targets[0, i], targets[1, i]
-            for j in range(sources.shape[1]):
-                dx = xi - sources[0, j]
-                dy = yi - sources[1, j]
-                inverse = 1.0 / (dx * dx + dy * dy)
-                high, low = powers(square * inverse)
-                strength = scale * inverse * (high - low)
-                radial = -scale * inverse * inverse * ((m + 2) * high - (n + 2) * low)
-                xx[i, j] = strength + radial * dx * dx
-                xy[i, j] = radial * dx * dy
-                yy[i, j] = strength + radial * dy * dy
-
-    return AdhesionKernels(force, energy, hessian)
+@compiled
+def adhesion_hessian(targets, sources, distance, m, n, scale, xx, xy, yy):  # type: ignore[no-untyped-def]
+    """Fill the components (t, s) of the derivative of each pair's force by the target's position."""
+    dx, dy, inverse, high, low = np.empty((5, sources.shape[1]))
+    for i in range(targets.shape[1]):
+        for j in range(sources.shape[1]):
+            dx[j] = targets[0, i] - sources[0, j]
+            dy[j] = targets[1, i] - sources[1, j]
+        _powers(dx, dy, distance * distance, m, n, inverse, high, low)
+        for j in range(sources.shape[1]):
+            strength = scale * inverse[j] * (high[j] - low[j])
+            radial = -scale * inverse[j] * inverse[j] * ((m + 2) * high[j] - (n + 2) * low[j])
+            xx[i, j] = strength + radial * dx[j] * dx[j]
+            xy[i, j] = radial * dx[j] * dy[j]
+            yy[i, j] = strength + radial * dy[j] * dy[j]

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from itertools import permutations
+from collections.abc import Iterator
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from solver import kernels
 from solver.geometry import Geometry
+from solver.kernels import pair_distances
 from solver.quadrature import refinement_factors
 from solver.spectral import interpolation
 
@@ -19,8 +20,6 @@ Array = NDArray[np.float64]
 class Refinement(NamedTuple):
     """Points of one vesicle for which another is interpolated to ``factor`` times as many points."""
 
-    target: int
-    source: int
     factor: int
     rows: NDArray[np.int64]  # of the target's points
     targets: Array  # (2, rows)
@@ -28,61 +27,52 @@ class Refinement(NamedTuple):
     interpolation: Array  # (factor·N, N)
 
 
-class Proximity:
-    """Finds the refinements of a geometry.
+class Closeness:
+    """Distances between all membranes of a geometry, and what they ask of the quadrature."""
 
-    Parameters
-    ----------
-    ratio : float
-        Distance over spacing from which on no refinement is needed (`quadrature.required_ratio`).
-    """
+    def __init__(self, geometry: Geometry) -> None:
+        self._geometry = geometry
+        self._sources: dict[tuple[int, int], Array] = {}
 
-    def __init__(self, ratio: float) -> None:
-        self.ratio = ratio
+    @cached_property
+    def _distances(self) -> Array:
+        """Of every point to every other membrane over its spacing, (target, source, N)."""
+        membranes = self._geometry.membranes
+        distance = np.full((membranes.count, membranes.count, membranes.points), np.inf)
+        pair_distances(self._geometry.points, self._geometry.tangents, membranes.spacing, distance)
+        distance /= membranes.spacing[:, None]
+        return distance
 
-    def refinements(self, geometry: Geometry) -> list[Refinement]:
-        """All refinements, ordered pair by ordered pair."""
-        points, tangents = geometry.points, geometry.tangents
-        spacing = geometry.membranes.spacing
-        found = []
-        distance = np.empty(geometry.membranes.points)
-        for target, source in permutations(range(geometry.membranes.count), 2):
-            sources = np.ascontiguousarray(points[:, source])
-            targets = np.ascontiguousarray(points[:, target])
-            kernels.distances(
-                targets, sources, np.ascontiguousarray(tangents[:, source]), spacing[source], distance
+    def refinements(self, target: int, source: int, ratio: float) -> Iterator[Refinement]:
+        """Refinements with which no target point is nearer than ``ratio`` spacings of the source."""
+        distance = self._distances[target, source]
+        if distance.min() >= ratio:
+            return
+        factors = refinement_factors(distance, ratio)
+        points = self._geometry.membranes.points
+        for factor in set(factors.tolist()) - {1}:
+            rows = np.flatnonzero(factors == factor)
+            yield Refinement(
+                factor,
+                rows,
+                self._geometry.points[:, target, rows],
+                self._fine_points(source, factor),
+                interpolation(points, factor),
             )
-            if distance.min() >= self.ratio * spacing[source]:
-                continue
-            factors = refinement_factors(distance / spacing[source], self.ratio)
-            for factor in np.unique(factors[factors > 1]):
-                rows = np.flatnonzero(factors == factor)
-                matrix = interpolation(geometry.membranes.points, int(factor))
-                found.append(
-                    Refinement(
-                        target, source, int(factor), rows, targets[:, rows], sources @ matrix.T, matrix
-                    )
-                )
-        return found
+
+    def _fine_points(self, vesicle: int, factor: int) -> Array:
+        if (vesicle, factor) not in self._sources:
+            matrix = interpolation(self._geometry.membranes.points, factor)
+            self._sources[vesicle, factor] = self._geometry.points[:, vesicle] @ matrix.T
+        return self._sources[vesicle, factor]
 
 
 def gap(geometry: Geometry, refinement: int = 4) -> float:
-    """Smallest distance between two different membranes."""
-    smallest = np.inf
-    points = geometry.membranes.points
-    matrix = interpolation(points, refinement)
-    fine_points = geometry.points @ matrix.T
-    fine_tangents = geometry.tangents @ matrix.T
-    distance = np.empty(points * refinement)
-    for target, source in permutations(range(geometry.membranes.count), 2):
-        kernels.distances(
-            np.ascontiguousarray(fine_points[:, target]),
-            np.ascontiguousarray(fine_points[:, source]),
-            np.ascontiguousarray(fine_tangents[:, source]),
-            geometry.membranes.spacing[source] / refinement,
-            distance,
-        )
-        smallest = min(smallest, float(distance.min()))
-    return smallest
-
-
+    """Smallest distance between two different membranes, seen at ``refinement`` times as many points."""
+    membranes = geometry.membranes
+    matrix = interpolation(membranes.points, refinement).T
+    distance = np.full((membranes.count, membranes.count, refinement * membranes.points), np.inf)
+    pair_distances(
+        geometry.points @ matrix, geometry.tangents @ matrix, membranes.spacing / refinement, distance
+    )
+    return float(distance.min())

@@ -8,14 +8,15 @@ vesicle the trapezoid rule is used, on refined sources where the target is close
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from itertools import permutations
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver import kernels
 from solver.geometry import Geometry, Membranes
-from solver.proximity import Refinement
+from solver.proximity import Closeness
+from solver.quadrature import required_ratio
 from solver.spectral import logarithm_weights
 
 Array = NDArray[np.float64]
@@ -27,13 +28,20 @@ class SingleLayer:
     The components act on point forces, that is force densities times the spacing, and are then symmetric
     up to quadrature error.
 
+    Parameters
+    ----------
+    membranes : Membranes
+    accuracy : float
+        Relative error allowed in the velocity that one vesicle causes on another.
+
     Attributes
     ----------
     xx, xy, yy : (M·N, M·N)
         Filled by `assemble`.
     """
 
-    def __init__(self, membranes: Membranes) -> None:
+    def __init__(self, membranes: Membranes, accuracy: float) -> None:
+        self._ratio = required_ratio(1.0, accuracy)
         points = membranes.points
         size = membranes.count * points
         self.xx, self.xy, self.yy = np.zeros((3, size, size))
@@ -45,33 +53,33 @@ class SingleLayer:
         # On the diagonal r²/(4 sin²) tends to (length/2π)².
         self._diagonal = (weights[0, 0] - np.log(membranes.length / (2 * np.pi))) / (4 * np.pi)
 
-    def assemble(self, geometry: Geometry, refinements: Iterable[Refinement]) -> None:
-        """Fill the components for this geometry."""
-        points = geometry.membranes.points
+    def assemble(self, geometry: Geometry, closeness: Closeness | None) -> None:
+        """Fill the components for this geometry; ``closeness`` is None for a single vesicle."""
+        count, points = geometry.membranes.count, geometry.membranes.points
         all_points = geometry.points.reshape(2, -1)
-        kernels.stokeslets(all_points, all_points, self.xx, self.xy, self.yy)
-        for vesicle in range(geometry.membranes.count):
+        components = self.xx, self.xy, self.yy
+        kernels.stokeslets(all_points, all_points, *components)
+        for vesicle in range(count):
             kernels.complete_self_part(
                 self._regular_part,
                 self._diagonal[vesicle],
                 geometry.tangents[:, vesicle],
                 vesicle * points,
-                self.xx,
-                self.xy,
-                self.yy,
+                *components,
             )
-        for near in refinements:
-            kernels.refine_stokeslets(
-                near.targets,
-                near.sources,
-                near.interpolation,
-                near.rows,
-                near.target * points,
-                near.source * points,
-                self.xx,
-                self.xy,
-                self.yy,
-            )
+        if closeness is None:
+            return
+        for target, source in permutations(range(count), 2):
+            for near in closeness.refinements(target, source, self._ratio):
+                kernels.refine_stokeslets(
+                    near.targets,
+                    near.sources,
+                    near.interpolation,
+                    near.rows,
+                    target * points,
+                    source * points,
+                    *components,
+                )
 
     def velocity(self, point_forces: Array) -> Array:
         """Velocity (2, M, N) that point forces (2, M, N) cause at the membranes' points."""
