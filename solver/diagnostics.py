@@ -76,8 +76,8 @@ class Recorder:
         self.values: dict[str, list[float]] = {}
         self.spatial_error = 0.0
 
-    def record(self, time: float, state: Array, *, keep_frame: bool = False) -> None:
-        """Measure a state, and keep it as a frame if one is due or ``keep_frame`` says so."""
+    def record(self, time: float, state: Array) -> None:
+        """Measure a state, and keep it as a frame if one is due."""
         motion = self._dynamics.motion(state)
         self._append("time", time)
         for name, measure in self._measures.items():
@@ -89,8 +89,19 @@ class Recorder:
         tangent_angle = membranes.tangent_angle(state)
         turned = 2 * np.pi * np.arange(membranes.points) / membranes.points
         self.spatial_error = max(self.spatial_error, float(tail(tangent_angle - turned).max()))
-        if keep_frame or self._frame_is_due(time):
-            self._frames.append((time, tangent_angle, membranes.center(state), motion.tension))
+        if self._frame_is_due(time):
+            self._keep(time, state, motion)
+
+    def finish(self, time: float, state: Array) -> None:
+        """Measure the last state, unless it is recorded already, and keep it as a frame."""
+        if time > self.values["time"][-1]:
+            self.record(time, state)
+        if time > self._frames[-1][0]:
+            self._keep(time, state, self._dynamics.motion(state))
+
+    def _keep(self, time: float, state: Array, motion: Motion) -> None:
+        membranes = self._dynamics.membranes
+        self._frames.append((time, membranes.tangent_angle(state), membranes.center(state), motion.tension))
 
     def _append(self, name: str, value: float) -> None:
         self.values.setdefault(name, []).append(value)

@@ -92,7 +92,7 @@ def simulate(
                 raise Cancelled
             if on_progress:
                 on_progress(step.end, latest)
-        recorder.record(progress.time, progress.state, keep_frame=True)
+        recorder.finish(progress.time, progress.state)
     except (StepFailedError, TensionNotFoundError, np.linalg.LinAlgError) as error:
         outcome, failure = Outcome.FAILED, str(error)
     work = Work(

@@ -1,0 +1,73 @@
+"""The fixed values that a search may try.
+
+A value on a grid is a pure function of its index, the same to the last bit in every process, so searches
+started from different guesses end in the same bracket and share their runs.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from decimal import Context
+from functools import cached_property
+
+# A library's binary power may differ in the last bit from machine to machine; correctly rounded decimal
+# arithmetic with digits to spare does not.
+_DECIMAL = Context(prec=34)
+
+
+@dataclass(frozen=True)
+class GeometricGrid:
+    """Values 10^(index/points_per_decade), so index 0 is the origin 1.0.
+
+    There are the fewest points per decade that bring neighbors closer than the tolerance:
+    (high − low)/low < tolerance.
+
+    Parameters
+    ----------
+    tolerance : float
+        Relative distance that neighbors must stay below, > 0.
+
+    Raises
+    ------
+    ValueError
+        If the tolerance is not a positive number.
+    """
+
+    tolerance: float
+
+    def __post_init__(self) -> None:
+        if not 0 < self.tolerance < math.inf:
+            raise ValueError(f"tolerance: {self.tolerance} — must be a number greater than 0")
+
+    @cached_property
+    def points_per_decade(self) -> int:
+        """Number of grid steps between a value and ten times that value."""
+        return math.floor(math.log(10) / math.log1p(self.tolerance)) + 1
+
+    def value(self, index: int) -> float:
+        """Return the value at this index."""
+        return float(_DECIMAL.power(10, _DECIMAL.divide(index, self.points_per_decade)))
+
+    def nearest(self, value: float) -> int:
+        """Return the index of the grid value with the ratio closest to 1 to this value (> 0)."""
+        return round(self.points_per_decade * math.log10(value))
+
+    def index(self, value: float) -> int:
+        """Return the index of a value on the grid.
+
+        Raises
+        ------
+        ValueError
+            If the value is not, to the last bit, a value of this grid.
+        """
+        if 0 < value < math.inf:
+            index = self.nearest(value)
+            if self.value(index) == value:
+                return index
+        raise ValueError(f"{value!r} is not on the grid of {self.points_per_decade} values a decade from 1.0")
+
+    def within(self, low: float, high: float) -> range:
+        """Return the indices of all values in [low, high], both > 0."""
+        first, last = self.nearest(low), self.nearest(high)
+        return range(first + (self.value(first) < low), last + 1 - (self.value(last) > high))

@@ -1,0 +1,268 @@
+"""A study: one search for a critical value at every value of a sweep, described by a TOML document.
+
+Presets of studies and scenes ship with the package and are used by name.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import tomllib
+from collections.abc import Iterable, Mapping
+from functools import cached_property
+from importlib.resources import files
+from pathlib import Path
+from typing import Annotated, Any, Self, TypeVar
+
+from pydantic import Field, ValidationError, ValidationInfo, field_validator, model_validator
+
+from ensemble.grid import GeometricGrid
+from ensemble.overrides import explain, locations, override, parse_override, value_at
+from ensemble.search import CriticalValue, Side
+from solver.run import Outcome
+from solver.scene import Model, Positive, Scene
+
+# A guess reaches beyond the point on the line through known neighbors by this share of the line's change
+# from the nearest of them, for the boundary's curvature, and by this many tolerances for their brackets.
+CURVATURE_MARGIN = 0.1
+BRACKET_MARGIN = 2.0
+
+NO_ANSWER = {Outcome.UNDECIDED: Side.UNDECIDED, Outcome.FAILED: Side.FAILED}
+
+
+class Search(Model):
+    """Which critical value is looked for: of what, within which limits, between which outcomes."""
+
+    parameter: str  # dotted path in the scene
+    tolerance: float = Field(0.01, gt=0, le=0.5)  # relative width that the bracket stays below
+    limits: tuple[Positive, Positive]
+    guess: tuple[Positive, Positive] | None = None  # where it may lie while no other point is known
+    low: tuple[Outcome, ...] = Field(min_length=1)  # outcomes below the critical value
+    high: tuple[Outcome, ...] = Field(min_length=1)  # outcomes above it
+
+    @field_validator("limits", "guess")
+    @classmethod
+    def _ascending(cls, ends: tuple[float, float] | None) -> tuple[float, float] | None:
+        if ends is not None and not ends[0] < ends[1]:
+            raise ValueError("the first must be less than the second")
+        return ends
+
+    @field_validator("limits")
+    @classmethod
+    def _wide_enough(cls, limits: tuple[float, float], info: ValidationInfo) -> tuple[float, float]:
+        tolerance = info.data.get("tolerance")  # absent if it was refused itself
+        if tolerance is not None and len(GeometricGrid(tolerance).within(*limits)) < 2:
+            raise ValueError(f"must be further apart than the tolerance {tolerance}")
+        return limits
+
+    @field_validator("low", "high")
+    @classmethod
+    def _answers(cls, outcomes: tuple[Outcome, ...]) -> tuple[Outcome, ...]:
+        if NO_ANSWER.keys() & set(outcomes):
+            raise ValueError(f"{' and '.join(NO_ANSWER)} are no answers and belong to neither side")
+        return outcomes
+
+    @field_validator("high")
+    @classmethod
+    def _opposite(cls, high: tuple[Outcome, ...], info: ValidationInfo) -> tuple[Outcome, ...]:
+        if set(high) & set(info.data.get("low", ())):
+            raise ValueError("must share no outcome with low")
+        return high
+
+
+class Sweep(Model):
+    """Along what, and at which values, the boundary is traced."""
+
+    parameter: str  # dotted path in the scene
+    values: tuple[float, ...] = Field(min_length=1)
+
+    @field_validator("values")
+    @classmethod
+    def _distinct(cls, values: tuple[float, ...]) -> tuple[float, ...]:
+        if len(set(values)) < len(values):
+            raise ValueError("values must be distinct")
+        return values
+
+
+class Study(Model):
+    """A boundary between outcomes, traced from a base scene in two of its parameters."""
+
+    name: Annotated[str, Field(min_length=1)]
+    scene: Scene
+    search: Search
+    sweep: Sweep
+
+    @model_validator(mode="after")
+    def _parameters_fit_the_scene(self) -> Self:
+        searched = self._number_locations("search.parameter", self.search.parameter)
+        swept = self._number_locations("sweep.parameter", self.sweep.parameter)
+        if searched & swept:
+            raise ValueError(
+                f"sweep.parameter: {self.sweep.parameter!r} — must differ from search.parameter "
+                f"{self.search.parameter!r}"
+            )
+        for sweep_value in self.sweep.values:
+            for limit in self.search.limits:
+                self.scene_at(sweep_value, limit)
+        return self
+
+    def _number_locations(self, field: str, path: str) -> set[tuple[str | int, ...]]:
+        document = self._scene_document
+        try:
+            found = set(locations(document, path))
+        except ValueError as error:
+            raise ValueError(f"{field}: {error}") from None
+        numbers = [value_at(document, location) for location in found]
+        if not numbers or not all(type(number) in (int, float) for number in numbers):
+            raise ValueError(f"{field}: {path!r} — must be the dotted path of a number in the scene")
+        return found
+
+    @cached_property
+    def _scene_document(self) -> dict[str, Any]:
+        return self.scene.model_dump()
+
+    @cached_property
+    def key(self) -> str:
+        """Key of the study: 16 hexadecimal digits of the SHA-256 of its canonical JSON."""
+        canonical = json.dumps(self.model_dump(mode="json"), sort_keys=True, separators=(",", ":"))
+        return hashlib.sha256(canonical.encode()).hexdigest()[:16]
+
+    def scene_at(self, sweep_value: float, value: float) -> Scene:
+        """Return the scene with the swept and the searched parameter at these values.
+
+        Raises
+        ------
+        ValueError
+            If the scene does not allow one of them.
+        """
+        changes = {self.sweep.parameter: sweep_value, self.search.parameter: value}
+        return _validate(Scene, override(self._scene_document, changes))
+
+    def side(self, outcome: Outcome) -> Side:
+        """Return the side of the critical value on which an outcome lies.
+
+        An outcome that the study does not name is no answer to its question, hence undecided.
+        """
+        if outcome in self.search.low:
+            return Side.LOW
+        if outcome in self.search.high:
+            return Side.HIGH
+        return NO_ANSWER.get(outcome, Side.UNDECIDED)
+
+    def critical_value(self, guess: tuple[float, float] | None = None) -> CriticalValue:
+        """Return a new search for one point of the boundary."""
+        return CriticalValue(GeometricGrid(self.search.tolerance), self.search.limits, guess)
+
+    def guess_at(
+        self, sweep_value: float, known: Mapping[float, tuple[float, float]]
+    ) -> tuple[float, float] | None:
+        """Say where the critical value is expected from the points of the boundary that are known.
+
+        On the line through two known neighbors, on either side where possible, and a little around it.
+        A single one is followed as far as the boundary may rise or fall in proportion to the sweep.
+
+        Parameters
+        ----------
+        sweep_value : float
+        known : mapping from sweep value to bracket
+            Converged points.
+
+        Returns
+        -------
+        (low, high) or None
+            Within the limits; the study's own guess, if any, while nothing is known.
+        """
+        if not known:
+            return self.search.guess
+        centers = {at: math.sqrt(low * high) for at, (low, high) in known.items()}
+        nearest, *others = sorted(centers, key=lambda at: abs(at - sweep_value))
+        if not others:
+            ratio = sweep_value / nearest if nearest else 0.0
+            spread = max(ratio, 1 / ratio) if ratio > 0 else 2.0  # no proportion across zero
+            return self._within_limits(centers[nearest] / spread, centers[nearest] * spread)
+        beyond = (at for at in others if (at - sweep_value) * (nearest - sweep_value) < 0)
+        other = next(beyond, others[0])
+        slope = (centers[other] - centers[nearest]) / (other - nearest)
+        change = slope * (sweep_value - nearest)
+        center = self._within_limits(centers[nearest] + change, math.inf)[0]
+        margin = BRACKET_MARGIN * self.search.tolerance * center + CURVATURE_MARGIN * abs(change)
+        return self._within_limits(center - margin, center + margin)
+
+    def _within_limits(self, low: float, high: float) -> tuple[float, float]:
+        first, last = self.search.limits
+        return min(max(low, first), last), min(max(high, first), last)
+
+
+def preset_names() -> tuple[str, ...]:
+    """Return the names of the studies and scenes that ship with the package, sorted."""
+    presets = (files("ensemble") / "presets").iterdir()
+    return tuple(sorted(Path(preset.name).stem for preset in presets if preset.name.endswith(".toml")))
+
+
+def load_study(
+    name_or_path: str | Path, overrides: Iterable[str] = (), tolerance: float | None = None
+) -> Study:
+    """Read a study from a preset or a TOML file.
+
+    Parameters
+    ----------
+    name_or_path : str or Path
+        Name of a preset, else a file.
+    overrides : iterable of str
+        ``path=value`` with paths from the top of the document, such as ``scene.numerics.points=128``.
+    tolerance : float, optional
+        Replaces the relative tolerance of the search.
+
+    Raises
+    ------
+    ValueError
+        If there is no such preset or file, or it is not a valid study; names the field.
+    """
+    changes = dict(parse_override(text) for text in overrides)
+    if tolerance is not None:
+        changes["search.tolerance"] = tolerance
+    return _load(Study, name_or_path, changes)
+
+
+def load_scene(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Scene:
+    """Read a scene from a preset or a TOML file.
+
+    Parameters
+    ----------
+    name_or_path : str or Path
+        Name of a preset, else a file.
+    overrides : iterable of str
+        ``path=value``, such as ``flow.rate=0.5``.
+
+    Raises
+    ------
+    ValueError
+        If there is no such preset or file, or it is not a valid scene; names the field.
+    """
+    return _load(Scene, name_or_path, dict(parse_override(text) for text in overrides))
+
+
+Document = TypeVar("Document", bound=Model)
+
+
+def _load(model: type[Document], name_or_path: str | Path, changes: Mapping[str, Any]) -> Document:
+    if str(name_or_path) in preset_names():
+        source = files("ensemble") / "presets" / f"{name_or_path}.toml"
+    elif Path(name_or_path).is_file():
+        source = Path(name_or_path)
+    else:
+        raise ValueError(
+            f"{str(name_or_path)!r} is neither a file nor a preset; presets: {', '.join(preset_names())}"
+        )
+    try:
+        return _validate(model, override(tomllib.loads(source.read_text(encoding="utf-8")), changes))
+    except ValueError as error:
+        raise ValueError(f"{name_or_path}: {error}") from error
+
+
+def _validate(model: type[Document], document: Mapping[str, Any]) -> Document:
+    try:
+        return model.model_validate(document)
+    except ValidationError as error:
+        raise ValueError(explain(error, document)) from error
