@@ -1,0 +1,128 @@
+"""The phase diagram of a study: every run, the brackets of the boundary and a straight line through it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.polynomial import Polynomial
+
+from ensemble.boundary import Boundary, BoundaryPoint
+from ensemble.figures.style import BLACK, GRAY, MARKS, STYLE, WIDTH
+from ensemble.figures.symbols import Quantity, describe, quantity
+from ensemble.search import Status
+from solver.run import Array, Outcome
+from solver.scene import Scene
+
+_FEWEST_TO_FIT = 3  # two points lie on a line whatever the physics
+
+
+@matplotlib.rc_context(STYLE)
+def phase_diagram(boundary: Boundary, runs: Sequence[tuple[float, float, Outcome]]) -> Figure:
+    """Draw where in the plane of two parameters vesicles stay together.
+
+    Parameters
+    ----------
+    boundary : Boundary
+        Its sweep parameter is drawn on x, its searched parameter on y.
+    runs : sequence of (sweep value, searched value, outcome)
+        Every run is one mark.
+
+    Returns
+    -------
+    Figure
+        The artists' group ids are ``run <outcome>``, ``bracket``, ``boundary`` and ``fit``.
+    """
+    swept = boundary.study["sweep"]["parameter"]
+    searched = boundary.study["search"]["parameter"]
+    scene = Scene.model_validate(boundary.study["scene"])
+    flow = None if scene.flow is None else scene.flow.kind
+    x, y = quantity(swept, flow), quantity(searched, flow)
+
+    figure = Figure(figsize=(WIDTH, 4.0), layout="constrained")
+    axes = figure.add_subplot(xlabel=x.label, ylabel=y.label)
+    axes.set_title(describe(scene, without=(swept, searched)), pad=10)
+    _draw_runs(axes, runs)
+    points = sorted(boundary.points, key=lambda point: point.parameters[swept])
+    known = [point for point in points if point.critical_value is not None]
+    if known:
+        _draw_brackets(axes, known, swept)
+        _draw_boundary(axes, known, swept, y)
+    converged = [point for point in known if point.status == Status.CONVERGED]
+    if len(converged) >= _FEWEST_TO_FIT:
+        _draw_fit(axes, converged, swept, x, y)
+    axes.margins(0.06)
+    if axes.get_legend_handles_labels()[0]:
+        figure.legend(loc="outside right center")
+    return figure
+
+
+def _draw_runs(axes: Axes, runs: Sequence[tuple[float, float, Outcome]]) -> None:
+    for outcome, mark in MARKS.items():
+        chosen = np.array([(sweep, value) for sweep, value, result in runs if result == outcome])
+        if chosen.size:
+            axes.plot(
+                *chosen.T,
+                linestyle="none",
+                marker=mark.shape,
+                color=mark.color,
+                markerfacecolor=mark.face,
+                markeredgecolor=mark.edge,
+                markeredgewidth=mark.edge_width,
+                markersize=6.5,
+                label=str(outcome),
+                gid=f"run {outcome}",
+            )
+
+
+def _draw_brackets(axes: Axes, known: Sequence[BoundaryPoint], swept: str) -> None:
+    ends = np.array([point.bracket for point in known], dtype=float)
+    certified = sum(point.certified for point in known)
+    _, _, (bars,) = axes.errorbar(
+        [point.parameters[swept] for point in known],
+        ends.mean(axis=1),
+        yerr=np.ptp(ends, axis=1) / 2,
+        fmt="none",
+        ecolor=BLACK,
+        elinewidth=1.0,
+        capsize=5.5,
+        capthick=1.0,
+        zorder=3,
+        label=f"bracket ({certified} of {len(known)} certified)",
+    )
+    bars.set_gid("bracket")
+
+
+def _draw_boundary(axes: Axes, known: Sequence[BoundaryPoint], swept: str, y: Quantity) -> None:
+    axes.plot(
+        *_critical_values(known, swept),
+        color=GRAY,
+        zorder=1.5,
+        label=f"critical value ${y.critical}$",
+        gid="boundary",
+    )
+
+
+def _draw_fit(axes: Axes, converged: Sequence[BoundaryPoint], swept: str, x: Quantity, y: Quantity) -> None:
+    sweep, critical = _critical_values(converged, swept)
+    line = Polynomial.fit(sweep, critical, deg=1)
+    intercept, slope = map(float, line.convert().coef)
+    sign = "−" if intercept < 0 else "+"
+    ends = np.array([sweep.min(), sweep.max()])
+    axes.plot(
+        ends,
+        line(ends),
+        color=BLACK,
+        linestyle=(0, (4, 3)),
+        zorder=1.6,
+        label=f"fit, ${y.critical}$ = {slope:.3g} ${x.symbol}$ {sign} {abs(intercept):.2g}",
+        gid="fit",
+    )
+
+
+def _critical_values(known: Sequence[BoundaryPoint], swept: str) -> tuple[Array, Array]:
+    sweep = np.array([point.parameters[swept] for point in known])
+    return sweep, np.array([point.critical_value for point in known], dtype=float)

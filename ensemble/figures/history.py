@@ -1,0 +1,87 @@
+"""What happened in a run: its membranes and, below them, its diagnostics against time."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+
+import matplotlib
+import numpy as np
+from matplotlib.figure import Figure
+
+from ensemble.figures.membranes import choose_snapshots, draw_membranes, extension
+from ensemble.figures.panels import PANELS
+from ensemble.figures.style import GRAY, STYLE, WIDTH
+from ensemble.figures.symbols import describe
+from solver.run import Run
+
+# Heights in inches.
+_PANEL = 1.8
+_LINE = 0.2
+_STRIP = (0.3, 3.0)  # of the membranes, at least and at most
+_AROUND_STRIP = 0.85  # their times above and the color bar below
+
+_CHARACTERS = 105  # in a line of the heading
+
+
+@matplotlib.rc_context(STYLE)
+def run_figure(run: Run) -> Figure:
+    """Draw snapshots colored by tension and, as far as the run has them, its diagnostics against time.
+
+    Parameters
+    ----------
+    run : Run
+
+    Returns
+    -------
+    Figure
+        Its axes are labeled ``membranes``, ``tension`` (the color bar) and, below, by the first of the series
+        that they show: ``gap``, ``center_angle``, ``inclination_angle``, ``bending_energy``,
+        ``viscosity_bending_tension``.
+    """
+    panels = {name: draw for name, draw in PANELS.items() if name in run.series}
+    columns = 3 if len(panels) == 3 else 2
+    rows = math.ceil(len(panels) / columns)
+    heading = _heading(run)
+
+    figure = Figure(layout="constrained")
+    figure.suptitle("\n".join(heading), fontsize="medium")
+    grid = figure.add_gridspec(2, 1)
+    strip = figure.add_subplot(grid[0], label="membranes")
+    membranes = draw_membranes(strip, run.scene, run.frames)
+    bar = figure.colorbar(
+        membranes,
+        ax=strip,
+        location="bottom",
+        extend=extension(membranes),
+        shrink=0.5,
+        aspect=40,
+        pad=0.05,
+    )
+    bar.ax.set_label("tension")
+    bar.set_label(r"tension $\sigma$")
+
+    cells = grid[1].subgridspec(rows, columns)
+    for position, (name, draw) in enumerate(panels.items()):
+        row, column = divmod(position, columns)
+        axes = figure.add_subplot(cells[row, column], label=name)
+        draw(axes, run)
+        if row == rows - 1:
+            axes.set_xlabel("time $t$")
+        for time in run.frames.time[choose_snapshots(run.frames)]:
+            axes.axvline(time, color=GRAY, alpha=0.3, linewidth=0.7, zorder=0.5)
+
+    height = np.clip(WIDTH * np.ptp(strip.get_ylim()) / np.ptp(strip.get_xlim()), *_STRIP)
+    grid.set_height_ratios([height, rows * _PANEL])
+    figure.set_size_inches(WIDTH, len(heading) * _LINE + height + _AROUND_STRIP + rows * _PANEL)
+    return figure
+
+
+def _heading(run: Run) -> list[str]:
+    """Return the scene in one line, then the outcome and why a failed run failed, wrapped."""
+    outcome = f"{run.outcome} at $t$ = {run.time:.4g}"
+    if run.period is not None:
+        outcome += f", period {run.period:.4g}"
+    if run.failure is not None:
+        outcome += ": " + run.failure.replace("$", r"\$")
+    return [describe(run.scene), *textwrap.wrap(outcome, _CHARACTERS)]

@@ -1,0 +1,127 @@
+"""Membranes colored by their tension, snapshot beside snapshot on one scale."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.colors import Normalize
+
+from ensemble.figures.style import PALE, TENSION_COLORS
+from solver.curve import positions
+from solver.run import Array, Frames
+from solver.scene import Scene
+from solver.spectral import interpolation
+
+_MOST_SNAPSHOTS = 8
+_SEGMENTS = 128  # of a drawn membrane, at least: a polygon of 64 sides shows its corners in print
+_SPACE = 0.5  # between neighboring snapshots, in the unit of length
+
+
+def choose_snapshots(frames: Frames) -> list[int]:
+    """Return the indices of at most eight frames, evenly spread in time, the first and the last among them.
+
+    Frames of which a position is not finite, as a failed run may end with, are passed over.
+    """
+    finite = np.isfinite(frames.tangent_angle).all(axis=(1, 2)) & np.isfinite(frames.center).all(axis=(1, 2))
+    drawable = np.flatnonzero(finite)
+    times = frames.time[drawable]
+    wanted = np.linspace(times[0], times[-1], _MOST_SNAPSHOTS)
+    return sorted({int(drawable[np.abs(times - time).argmin()]) for time in wanted})
+
+
+def membrane_segments(
+    scene: Scene, tangent_angle: Array, center: Array, tension: Array
+) -> tuple[Array, Array]:
+    """Cut closed membranes into short straight segments with a tension each.
+
+    Parameters
+    ----------
+    scene : Scene
+        Gives the vesicles' lengths.
+    tangent_angle, tension : (..., vesicles, points)
+    center : (..., vesicles, 2)
+
+    Returns
+    -------
+    ends : (..., vesicles, segments, 2, 2)
+        Start and end (x, y) of each segment, about the mean of the vesicles' centers.
+    tension : (..., vesicles, segments)
+        Mean of the tensions at the two ends.
+    """
+    points = tangent_angle.shape[-1]
+    refine = interpolation(points, math.ceil(_SEGMENTS / points))
+    length = np.array([vesicle.length for vesicle in scene.vesicles])
+    about_mean = center - center.mean(axis=-2, keepdims=True)
+    start = np.swapaxes(positions(tangent_angle, about_mean, length) @ refine.T, -1, -2)
+    ends = np.stack([start, np.roll(start, -1, axis=-2)], axis=-2)
+    at_start = tension @ refine.T
+    return ends, (at_start + np.roll(at_start, -1, axis=-1)) / 2
+
+
+def draw_membranes(axes: Axes, scene: Scene, frames: Frames) -> LineCollection:
+    """Draw snapshots in a row, each centered on its vesicles and headed by its time.
+
+    All of them share one unit of length and one color scale.
+
+    Returns
+    -------
+    LineCollection
+        The mappable for a color bar; its segments are ordered by snapshot, vesicle and arclength.
+    """
+    chosen = choose_snapshots(frames)
+    ends, tension = membrane_segments(
+        scene, frames.tangent_angle[chosen], frames.center[chosen], frames.tension[chosen]
+    )
+    reach = np.abs(ends).max(axis=(1, 2, 3))  # (snapshots, 2)
+    top = reach[:, 1].max()
+    tight = reach[:, 0] + _SPACE / 2
+    # Wide or tall figures are drawn small; the times above narrow snapshots must still fit.
+    half_width = np.maximum(tight, max(tight.mean(), 0.2 * top))
+    middle = np.cumsum(2 * half_width) - half_width
+    ends[..., 0] += middle[:, None, None, None]
+
+    lines = LineCollection(
+        list(ends.reshape(-1, 2, 2)),
+        cmap=TENSION_COLORS,
+        norm=_scale(tension),
+        linewidths=1.6,
+        capstyle="round",
+    )
+    lines.set_array(np.ma.masked_invalid(tension.ravel()))
+    axes.add_collection(lines)
+    # Bands show which vesicles belong together when they have drifted far apart.
+    for x, half in list(zip(middle, half_width, strict=True))[1::2]:
+        axes.axvspan(x - half, x + half, color=PALE, linewidth=0, zorder=0)
+    for x, time in zip(middle, frames.time[chosen], strict=True):
+        axes.annotate(
+            f"$t$ = {time:.4g}", (x, top), (0, 5), textcoords="offset points", ha="center", va="bottom"
+        )
+    axes.set(xlim=(0, 2 * half_width.sum()), ylim=(-top - 0.1, top + 0.1), aspect="equal")
+    axes.set_axis_off()
+    return lines
+
+
+def extension(membranes: LineCollection) -> Literal["neither", "min", "max", "both"]:
+    """Return the ends at which a color bar must say that there are tensions beyond its scale."""
+    on_scale: Array = np.ma.asarray(membranes.norm(np.ma.asarray(membranes.get_array()))).compressed()
+    below, above = np.any(on_scale < 0), np.any(on_scale > 1)
+    if below and above:
+        return "both"
+    return "min" if below else "max" if above else "neither"
+
+
+def _scale(tension: Array) -> Normalize:
+    """Color scale over the finite tensions, never so narrow that it would show rounding errors.
+
+    The first snapshot does not count where there are others: an ellipse that has not relaxed yet has
+    tensions several times larger, which would leave a single color to the rest of the run.
+    """
+    counted = tension[1:] if len(tension) > 1 else tension
+    known = counted[np.isfinite(counted)]
+    low, high = (known.min(), known.max()) if known.size else (0.0, 0.0)
+    margin = max(0.0, 1e-3 * (1 + abs(low)) - (high - low)) / 2
+    return Normalize(low - margin, high + margin)

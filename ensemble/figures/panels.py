@@ -1,0 +1,74 @@
+"""Diagnostics of a run against time, one small plot each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.ticker import MultipleLocator
+
+from ensemble.figures.style import BLACK, BLUE, GRAY, VERMILLION
+from ensemble.figures.symbols import DISTANCE
+from solver.run import Run
+
+_ANGLE_STEPS = (1, 2, 5, 10, 15, 30, 45, 90, 180, 360, 720)  # degrees between ticks
+_MOST_TICKS = 5
+
+
+def _draw_gap(axes: Axes, run: Run) -> None:
+    axes.plot(run.series["time"], run.series["gap"], color=BLACK)
+    axes.set(ylabel="gap", ylim=(0, None))
+    if run.scene.adhesion is not None:
+        distance = run.scene.adhesion.distance
+        axes.axhline(distance, color=GRAY, linewidth=0.9, linestyle="--")
+        beside = axes.get_yaxis_transform()
+        axes.annotate(f"${DISTANCE.symbol}$", (1, distance), (3, 0), beside, "offset points", va="center")
+
+
+def _draw_angle(axes: Axes, run: Run, name: str) -> None:
+    angle = np.degrees(run.series[name])
+    axes.plot(run.series["time"], angle, color=BLACK)
+    step = next((step for step in _ANGLE_STEPS if np.ptp(angle) <= _MOST_TICKS * step), _ANGLE_STEPS[-1])
+    axes.yaxis.set_major_locator(MultipleLocator(step))
+
+
+def _draw_center_angle(axes: Axes, run: Run) -> None:
+    _draw_angle(axes, run, "center_angle")
+    axes.set_ylabel("center angle (deg)")
+
+
+def _draw_inclination(axes: Axes, run: Run) -> None:
+    _draw_angle(axes, run, "inclination_angle")
+    axes.set_ylabel("inclination (deg)")
+
+
+def _draw_parts(axes: Axes, run: Run, membrane: str, label: str, adhesion: str) -> None:
+    """Draw what membranes contribute and, if there is adhesion, what that contributes."""
+    axes.plot(run.series["time"], run.series[membrane], color=BLUE, label=label)
+    if adhesion in run.series:
+        axes.plot(
+            run.series["time"], run.series[adhesion], color=VERMILLION, linestyle="-.", label="adhesion"
+        )
+    axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=2, borderaxespad=0.2)
+
+
+def _draw_energy(axes: Axes, run: Run) -> None:
+    _draw_parts(axes, run, "bending_energy", "bending", "adhesion_energy")
+    axes.set_ylabel("energy")
+
+
+def _draw_viscosity(axes: Axes, run: Run) -> None:
+    _draw_parts(axes, run, "viscosity_bending_tension", "bending + tension", "viscosity_adhesion")
+    axes.set_ylabel(r"intrinsic viscosity $[\mu]$")
+
+
+# By the series without which a panel is left out.
+PANELS: Final[dict[str, Callable[[Axes, Run], None]]] = {
+    "gap": _draw_gap,
+    "center_angle": _draw_center_angle,
+    "inclination_angle": _draw_inclination,
+    "bending_energy": _draw_energy,
+    "viscosity_bending_tension": _draw_viscosity,
+}

@@ -1,0 +1,84 @@
+"""How every figure looks: fonts, sizes, a colorblind-safe palette and the mark of each outcome."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import matplotlib
+import numpy as np
+from matplotlib.colors import ListedColormap
+
+from solver.run import Outcome
+
+WIDTH: Final = 7.2  # inches, the text width of a two-column journal
+
+# Applied while a figure is built and again while it is written, since ticks are made as late as that.
+STYLE: Final = matplotlib.RcParams(
+    {
+        "font.family": "STIXGeneral",
+        "mathtext.fontset": "stix",
+        "font.size": 10,
+        "axes.labelsize": 9.5,
+        "axes.titlesize": 10,
+        "legend.fontsize": 9,
+        "xtick.labelsize": 9,
+        "ytick.labelsize": 9,
+        "axes.linewidth": 0.7,
+        "axes.spines.top": False,
+        "axes.spines.right": False,
+        "lines.linewidth": 1.2,
+        "legend.frameon": False,
+        "savefig.dpi": 300,
+        "pdf.fonttype": 42,
+        "svg.hashsalt": "vesicle-ensemble",
+    }
+)
+
+# Okabe and Ito, https://jfly.uni-koeln.de/color/ (2008).
+BLUE: Final = "#0072B2"
+VERMILLION: Final = "#D55E00"
+GREEN: Final = "#009E73"
+ORANGE: Final = "#E69F00"
+SKY: Final = "#56B4E9"
+PURPLE: Final = "#CC79A7"
+BLACK: Final = "#000000"
+GRAY: Final = "#8C8C8C"
+PALE: Final = "#F4F4F4"
+
+# The pale end of plasma is cut off: a thin membrane drawn in it would vanish on white.
+TENSION_COLORS: Final = ListedColormap(
+    matplotlib.colormaps["plasma"](np.linspace(0, 0.86, 256)), "tension"
+).with_extremes(bad=GRAY)
+
+
+@dataclass(frozen=True)
+class Mark:
+    """How an outcome is drawn; color and shape each tell it apart from every other."""
+
+    color: str
+    shape: str
+    face: str
+    edge: str
+    edge_width: float  # points
+
+    @classmethod
+    def filled(cls, color: str, shape: str) -> Mark:
+        """Return a solid mark; its thin white rim keeps marks apart where they crowd."""
+        return cls(color, shape, face=color, edge="white", edge_width=0.5)
+
+    @classmethod
+    def hollow(cls, color: str, shape: str) -> Mark:
+        """Return an outlined mark, for runs that say nothing about the boundary."""
+        return cls(color, shape, face="white", edge=color, edge_width=1.2)
+
+
+MARKS: Final[dict[Outcome, Mark]] = {
+    Outcome.BOUND: Mark.filled(BLUE, "o"),
+    Outcome.END_TO_END: Mark.filled(GREEN, "s"),
+    Outcome.SEPARATED: Mark.filled(VERMILLION, "X"),
+    Outcome.EQUILIBRIUM: Mark.filled(SKY, "^"),
+    Outcome.STEADY: Mark.filled(PURPLE, "v"),
+    Outcome.UNDECIDED: Mark.hollow(ORANGE, "D"),
+    Outcome.FAILED: Mark.hollow(BLACK, "+"),
+}

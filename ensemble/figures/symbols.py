@@ -1,0 +1,84 @@
+"""Names and symbols, as the field writes them, of a scene's parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+from solver.scene import Scene
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A parameter's words for an axis, and its symbol in TeX without dollar signs."""
+
+    label: str
+    symbol: str
+
+    @classmethod
+    def named(cls, name: str, symbol: str) -> Quantity:
+        """Return a quantity whose label is its name followed by its symbol."""
+        return cls(f"{name}, ${symbol}$", symbol)
+
+    @property
+    def critical(self) -> str:
+        """Symbol of the critical value."""
+        return f"{{{self.symbol}}}_c"
+
+
+SHEAR_RATE = Quantity.named("shear rate", r"\dot{\gamma}")
+EXTENSION_RATE = Quantity.named("extension rate", r"\dot{\epsilon}")
+DISTANCE = Quantity.named("separation distance", r"\delta")
+
+_BY_PATH = {
+    "adhesion.hamaker": Quantity.named("Hamaker constant", r"\mathcal{H}"),
+    "adhesion.distance": DISTANCE,
+    "vesicles.reduced_area": Quantity.named("reduced area", r"\Delta A"),
+    "vesicles.length": Quantity.named("vesicle length", "L"),
+    "vesicles.bending_modulus": Quantity.named("bending modulus", r"\kappa_b"),
+}
+
+_FLOW_WORDS = {
+    None: "quiescent fluid",
+    "shear": "shear flow",
+    "extension": "extensional flow",
+    "trap": "a fluid trap",
+}
+
+
+def quantity(path: str, flow: str | None) -> Quantity:
+    """The quantity at a dotted path of a scene whose flow is of kind ``flow``.
+
+    A path that has no established symbol stands for itself.
+    """
+    if path == "flow.rate":
+        return SHEAR_RATE if flow == "shear" else EXTENSION_RATE
+    upright = r"\mathrm{" + path.replace("_", r"\_") + "}"
+    return _BY_PATH.get(path, Quantity(path, upright))
+
+
+def describe(scene: Scene, without: Collection[str] = ()) -> str:
+    """One line on a scene: flow, rate, reduced area, Hamaker constant and distance, as far as it has them.
+
+    Parameters
+    ----------
+    scene : Scene
+    without : collection of str
+        Dotted paths of parameters to leave out, for instance because they are the figure's axes.
+    """
+    values: dict[str, list[float]] = {}
+    if scene.flow is not None:
+        values["flow.rate"] = [scene.flow.rate]
+    values["vesicles.reduced_area"] = sorted({vesicle.reduced_area for vesicle in scene.vesicles})
+    if scene.adhesion is not None:
+        values["adhesion.hamaker"] = [scene.adhesion.hamaker]
+        values["adhesion.distance"] = [scene.adhesion.distance]
+    flow = None if scene.flow is None else scene.flow.kind
+    count = len(scene.vesicles)
+    words = [f"{count} vesicles" if count > 1 else "1 vesicle", f"in {_FLOW_WORDS[flow]}"]
+    parameters = [
+        f"${quantity(path, flow).symbol}$ = " + " and ".join(f"{number:g}" for number in numbers)
+        for path, numbers in values.items()
+        if path not in without
+    ]
+    return ", ".join([" ".join(words), *parameters])
