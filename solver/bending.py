@@ -20,7 +20,7 @@ class Bending:
         density *= -geometry.membranes.bending_modulus[:, None]
         return density
 
-    def jacobian(self, geometry: Geometry, dx: Array, dy: Array) -> tuple[Array, Array]:
+    def jacobian(self, geometry: Geometry) -> tuple[Array, Array]:
         """Derivatives of both components by the state, (M·N, state) each.
 
         x_s = (cos θ, sin θ), so x_ssss depends on the tangent angles directly, without the points.

@@ -21,7 +21,7 @@ from solver.flow import ImposedFlow, imposed_flow
 from solver.geometry import Geometry, Membranes
 from solver.proximity import Closeness
 from solver.scene import Scene
-from solver.spectral import differentiation, integration
+from solver.spectral import differentiation, highest_modes, integration
 from solver.stokes import SingleLayer
 from solver.tension import Inextensibility
 
@@ -94,28 +94,40 @@ class Dynamics:
         return Motion(geometry, velocity, tension, bending, adhesion)
 
     def rate(self, state: Array) -> Array:
-        """d(state)/dt."""
-        motion = self.motion(state)
-        return self.rate_of(motion)
+        """d(state)/dt.
 
-    def rate_of(self, motion: Motion) -> Array:
-        """d(state)/dt of a motion."""
-        geometry = motion.geometry
-        gradient = geometry.arclength_derivative(motion.velocity)
-        turning = geometry.tangents[0] * gradient[1] - geometry.tangents[1] * gradient[0]
+        The two highest modes of the tangent angle stay as they are: their tangents alias onto a mode whose
+        derivative vanishes, so that bending does not damp them and gliding would slowly fill them.
+        """
+        motion = self.motion(state)
+        turning = self._turning(motion)
+        curvature = motion.geometry.curvature
+        turning += gliding_speed(curvature, turning) * curvature
+        highest = highest_modes(self.membranes.points)
+        turning -= (turning @ highest) @ highest.T
         return np.concatenate([turning.ravel(), motion.velocity.mean(axis=2).ravel()])
 
-    def jacobian(self, state: Array) -> Array:
-        """Derivative of `rate` with the single-layer potential and the constraint's geometry held fixed.
+    @staticmethod
+    def _turning(motion: Motion) -> Array:
+        """n · u_s, (M, N): how fast the membrane's material turns."""
+        gradient = motion.geometry.arclength_derivative(motion.velocity)
+        tangents = motion.geometry.tangents
+        turning: Array = tangents[0] * gradient[1] - tangents[1] * gradient[0]
+        return turning
 
-        Shape (state_size, state_size).  Dropped are the derivatives of S, of the tension's direction and of
-        the constraint; kept are those of all forces and of the flow, which carry the stiffness.
+    def jacobian(self, state: Array) -> Array:
+        """Derivative of `rate` with the kernel of the single-layer potential held fixed.
+
+        Shape (state_size, state_size).  Dropped are the derivatives of S and of the gliding direction; kept are
+        those of all forces, the tension's direction, the constraint and the flow.
         """
-        geometry, closeness = self._assemble(state)
+        motion = self.motion(state)
+        geometry = motion.geometry
         dx, dy = self._point_derivatives(geometry)
-        force_x, force_y = self.bending.jacobian(geometry, dx, dy)
-        if self.adhesion and closeness:
-            adhesion_x, adhesion_y = self.adhesion.jacobian(geometry, closeness, dx, dy)
+        force_x, force_y = self.bending.jacobian(geometry)
+        self._add_tension_turning(motion, force_x, force_y)
+        if self.adhesion:
+            adhesion_x, adhesion_y = self.adhesion.jacobian(geometry, Closeness(geometry), dx, dy)
             force_x += adhesion_x
             force_y += adhesion_y
         weights = np.repeat(self.membranes.spacing, self.membranes.points)[:, None]
@@ -126,11 +138,26 @@ class Dynamics:
             flow_x, flow_y = self.flow.jacobian(dx, dy)
             ux += flow_x
             uy += flow_y
+        turning = self._turning(motion)
+        stretching = self.inextensibility.stretching(geometry, ux, uy)
+        every_point = np.arange(turning.size)
+        stretching[every_point, every_point] += turning.ravel()
         inverse, tension_x, tension_y = self.inextensibility.factorize(self.layer, geometry)
-        tension = inverse @ (weights * self.inextensibility.stretching(geometry, ux, uy))
+        tension = inverse @ (weights * stretching)
         ux += tension_x @ tension
         uy += tension_y @ tension
-        return self._rate_columns(geometry, ux, uy)
+        return self._rate_columns(geometry, ux, uy, gliding_speed(geometry.curvature, turning))
+
+    def _add_tension_turning(self, motion: Motion, force_x: Array, force_y: Array) -> None:
+        """Add the change of the tension's force with its direction, ∂/∂s (σ n δθ)."""
+        points = self.membranes.points
+        matrix = differentiation(points)
+        for vesicle in range(self.membranes.count):
+            block = slice(vesicle * points, (vesicle + 1) * points)
+            scaled = motion.tension[vesicle] * (2 * np.pi / self.membranes.length[vesicle])
+            tx, ty = motion.geometry.tangents[:, vesicle]
+            force_x[block, block] -= matrix * (scaled * ty)
+            force_y[block, block] += matrix * (scaled * tx)
 
     def _assemble(self, state: Array) -> tuple[Geometry, Closeness | None]:
         geometry = Geometry(self.membranes, state)
@@ -152,15 +179,38 @@ class Dynamics:
             dy[block, count * points + count + vesicle] = 1.0
         return dx, dy
 
-    def _rate_columns(self, geometry: Geometry, ux: Array, uy: Array) -> Array:
-        """`rate_of` for velocity components (M·N, columns)."""
+    def _rate_columns(self, geometry: Geometry, ux: Array, uy: Array, gliding: Array) -> Array:
+        """`rate` for velocity components (M·N, columns), the derivatives of the velocity by the state."""
         count, points = self.membranes.count, self.membranes.points
         result = np.empty((self.membranes.state_size, ux.shape[1]))
-        matrix = differentiation(points)
+        matrix, highest = differentiation(points), highest_modes(points)
         for vesicle in range(count):
             block = slice(vesicle * points, (vesicle + 1) * points)
-            tx, ty = geometry.tangents[:, vesicle, :, None] * (2 * np.pi / self.membranes.length[vesicle])
+            wavenumber = 2 * np.pi / self.membranes.length[vesicle]
+            tx, ty = geometry.tangents[:, vesicle, :, None] * wavenumber
             result[block] = tx * (matrix @ uy[block]) - ty * (matrix @ ux[block])
+            curvature = geometry.curvature[vesicle]
+            direction = _gliding_direction(curvature)
+            result[block] += np.outer(curvature, direction @ result[block])
+            result[block, block] += gliding[vesicle] * wavenumber * matrix
+            result[block] -= highest @ (highest.T @ result[block])
             result[count * points + vesicle] = ux[block].mean(axis=0)
             result[count * points + count + vesicle] = uy[block].mean(axis=0)
         return result
+
+
+def gliding_speed(curvature: Array, turning: Array) -> Array:
+    """Speed at which the points glide along each membrane so that their tangent angles change least, (M, 1).
+
+    With a speed c added along the tangent, θ_t = n · u_s + c θ_s.  Least squares over the part of θ_t that
+    varies along the membrane: c = −⟨w̃, κ̃⟩/⟨κ̃, κ̃⟩, w̃ and κ̃ being n · u_s and the curvature without their means.
+    """
+    return np.sum(_gliding_direction(curvature) * turning, axis=-1, keepdims=True)
+
+
+def _gliding_direction(curvature: Array) -> Array:
+    """The linear functional of n · u_s that `gliding_speed` is, (..., N)."""
+    variation = curvature - curvature.mean(axis=-1, keepdims=True)
+    size = np.sum(variation**2, axis=-1, keepdims=True)
+    # On a circle gliding changes nothing, and the quotient of two round-off errors must not drive it.
+    return -variation / (size + 1e-12 * np.sum(curvature**2, axis=-1, keepdims=True))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -89,6 +90,12 @@ class Geometry:
     def normals(self) -> Array:
         """Inward unit normals, (2, M, N)."""
         return np.stack([-self.tangents[1], self.tangents[0]])
+
+    @cached_property
+    def curvature(self) -> Array:
+        """θ_s, (M, N); positive for a circle."""
+        change = self.arclength_derivative(self.tangents)
+        return self.tangents[0] * change[1] - self.tangents[1] * change[0]
 
     def arclength_derivative(self, values: Array, order: int = 1) -> Array:
         """∂^order/∂s^order of values (..., M, N)."""

@@ -124,7 +124,7 @@ class Criteria(Model):
 class Output(Model):
     """How often diagnostics (``interval``) and states (``frame_interval``) are recorded."""
 
-    interval: Positive = 0.25
+    interval: Positive = 0.5
     frame_interval: Positive = 1.0
 
 

@@ -78,6 +78,15 @@ def logarithm_weights(points: int) -> Array:
     return _convolution(symbol)
 
 
+@cache
+def highest_modes(points: int) -> Array:
+    """Orthonormal basis of the modes with wavenumbers points/2 − 1 and points/2, shape (points, 3)."""
+    alpha = 2 * np.pi * np.arange(points) / points
+    below = points // 2 - 1
+    basis = np.stack([np.cos(below * alpha), np.sin(below * alpha), np.cos((below + 1) * alpha)], axis=1)
+    return _frozen(basis / np.linalg.norm(basis, axis=0))
+
+
 def tail(values: Array) -> Array:
     """Root of the summed squares of the last third of the spectrum, along the last axis."""
     spectrum = np.fft.rfft(values, axis=-1) / values.shape[-1]
