@@ -1,0 +1,106 @@
+"""Runs as zarr v3 groups, one directory each, that xarray opens as one data set."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import zarr
+from pydantic import ValidationError
+from zarr.codecs import ZstdCodec
+from zarr.storage import LocalStore
+
+from ensemble.record import NamedArray, RunSummary, arrays, rebuild
+from ensemble.store.errors import StoreError
+from solver.run import Array, Run
+
+CHUNK_BYTES = 1 << 20
+
+
+def _chunks(values: Array) -> tuple[int, ...]:
+    """Chunk shape of at most about `CHUNK_BYTES`, cut along the first dimension (time) only."""
+    bytes_each = max(values[:1].nbytes, 1)
+    rows = min(max(CHUNK_BYTES // bytes_each, 1), values.shape[0])
+    return tuple(max(length, 1) for length in (rows, *values.shape[1:]))
+
+
+def _write_array(group: zarr.Group, name: str, array: NamedArray) -> None:
+    group.create_array(
+        name,
+        data=np.ascontiguousarray(array.values),
+        chunks=_chunks(array.values),
+        # The checksum turns a flipped bit into an error instead of a different number.
+        compressors=ZstdCodec(level=3, checksum=True),
+        dimension_names=array.dimensions,
+        fill_value=float("nan"),
+        # Every chunk is a file, so a missing file is a loss and never an array of fill values.
+        config={"write_empty_chunks": True},
+    )
+
+
+def write_run(directory: Path, summary: RunSummary, run: Run) -> None:
+    """Write a run to a new directory."""
+    group = zarr.create_group(LocalStore(directory), zarr_format=3, attributes=summary.document())
+    for name, array in arrays(run).items():
+        _write_array(group, name, array)
+
+
+def _open(directory: Path) -> zarr.Group:
+    try:
+        return zarr.open_group(LocalStore(directory, read_only=True), mode="r", zarr_format=3)
+    except (OSError, ValueError, KeyError) as error:
+        raise StoreError(f"run {directory.name}: no readable group ({error})") from error
+
+
+def _summary(directory: Path, group: zarr.Group) -> RunSummary:
+    try:
+        return RunSummary.model_validate(dict(group.attrs))
+    except ValidationError as error:
+        raise StoreError(f"run {directory.name}: unreadable attributes ({error})") from error
+
+
+def _reader(directory: Path, group: zarr.Group) -> Callable[[str], Array]:
+    def read(name: str) -> Array:
+        place = f"run {directory.name}: array {name}"
+        # Metadata and codecs fail in many ways (zarr, numcodecs, JSON); all of them mean the same here.
+        try:
+            array = group[name]
+            if not isinstance(array, zarr.Array):
+                raise StoreError(f"{place} is not an array")
+            missing = array.nchunks - array.nchunks_initialized if array.size else 0
+            values = np.asarray(array[...], dtype=np.float64)
+        except StoreError:
+            raise
+        except KeyError as error:
+            raise StoreError(f"{place} is missing") from error
+        except Exception as error:
+            raise StoreError(f"{place} cannot be decoded ({error})") from error
+        if missing:
+            raise StoreError(f"{place} has lost {missing} of {array.nchunks} chunks")
+        return values
+
+    return read
+
+
+def read_summary(directory: Path) -> RunSummary:
+    """Read the attributes of a run.
+
+    Raises
+    ------
+    StoreError
+        If there is no readable group, or its attributes are not those of a run.
+    """
+    return _summary(directory, _open(directory))
+
+
+def read_run(directory: Path) -> Run:
+    """Read a run; every number has the bits that were written.
+
+    Raises
+    ------
+    StoreError
+        If an array is missing, incomplete or damaged, or the attributes are not those of a run.
+    """
+    group = _open(directory)
+    return rebuild(_summary(directory, group), _reader(directory, group))

@@ -1,0 +1,68 @@
+"""What is wrong with a stored run, in words."""
+
+from __future__ import annotations
+
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+
+from ensemble.keys import DISTRIBUTION, run_key
+from ensemble.record import RunSummary
+from ensemble.store.archive import read_run, read_summary
+from ensemble.store.errors import StoreError
+from solver.run import Outcome, Run
+
+
+def check_run(directory: Path, summary: RunSummary) -> list[str]:
+    """Compare a run's group with its row in the catalog.
+
+    Parameters
+    ----------
+    directory : Path
+        The group, named by the run's key.
+    summary : RunSummary
+        What the catalog says.
+
+    Returns
+    -------
+    list of str
+        Problems, one sentence each; empty if there is none.
+    """
+    name = f"run {directory.name}"
+    try:
+        stored, run = read_summary(directory), read_run(directory)
+    except StoreError as error:
+        return [str(error)]
+    problems = [f"{name}: {problem}" for problem in _array_problems(run)]
+    if stored.document() != summary.document():
+        problems.append(f"{name}: its attributes differ from its row in the catalog")
+    if summary.key != directory.name:
+        problems.append(f"{name}: its row has the key {summary.key}")
+    if summary.versions.get(DISTRIBUTION) == version(DISTRIBUTION) and run_key(stored.scene) != stored.key:
+        problems.append(f"{name}: its key is not that of its scene")
+    return problems
+
+
+def _array_problems(run: Run) -> list[str]:
+    frames = run.frames
+    vesicles, points = len(run.scene.vesicles), run.scene.numerics.points
+    times = frames.time.shape[:1]
+    expected = {
+        "frame_time": (frames.time, times),
+        "tangent_angle": (frames.tangent_angle, (*times, vesicles, points)),
+        "center": (frames.center, (*times, vesicles, 2)),
+        "tension": (frames.tension, (*times, vesicles, points)),
+    }
+    if "time" not in run.series:
+        return ["it has no array time"]
+    samples = run.series["time"].shape[:1]
+    expected |= {name: (values, samples) for name, values in run.series.items()}
+    problems = []
+    for name, (values, shape) in expected.items():
+        if values.shape != shape:
+            problems.append(f"array {name} has shape {values.shape}, not {shape}")
+        # A failed run may have failed because a value was not finite.
+        elif run.outcome is not Outcome.FAILED and not np.isfinite(values).all():
+            problems.append(f"array {name} holds values that are not finite")
+    return problems

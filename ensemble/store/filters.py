@@ -1,0 +1,182 @@
+"""Filters ``path op value``, such as ``flow.rate>=0.5``, checked against a model and evaluated in SQL."""
+
+from __future__ import annotations
+
+import operator
+import re
+import types
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, is_dataclass
+from datetime import datetime
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
+
+from pydantic import BaseModel, TypeAdapter, ValidationError
+from sqlalchemy import ColumnElement, and_
+from sqlalchemy.orm import InstrumentedAttribute
+
+from ensemble.store.errors import StoreInputError
+from ensemble.timestamp import timestamp_text
+
+COMPARISONS = {
+    "=": operator.eq,
+    "!=": operator.ne,
+    "<": operator.lt,
+    "<=": operator.le,
+    ">": operator.gt,
+    ">=": operator.ge,
+}
+EQUALITIES = ("=", "!=")
+PATTERN = re.compile(r"\s*(?P<path>\w+(?:\.\w+)*)\s*(?P<sign><=|>=|!=|=|<|>)\s*(?P<value>[^\s=<>].*?)\s*")
+# How a number that is not finite is written in a document; as text it would compare above every number.
+NON_FINITE = ("NaN", "Infinity", "-Infinity")
+
+
+@dataclass(frozen=True)
+class Field:
+    """Where a field lies in the JSON document, and its type."""
+
+    location: tuple[str | int, ...]
+    annotation: Any
+
+
+Fields = Mapping[str, Field]
+
+
+def model_fields(model: type[BaseModel], *prefix: str) -> dict[str, Field]:
+    """Top-level fields of a model whose JSON lies at `prefix` in the document."""
+    return {name: Field((*prefix, name), info.annotation) for name, info in model.model_fields.items()}
+
+
+def _alternatives(annotation: Any) -> Iterator[Any]:
+    """Types that a value may have, with unions and annotations taken apart and None left out."""
+    origin = get_origin(annotation)
+    if origin is Annotated:
+        yield from _alternatives(get_args(annotation)[0])
+    elif origin in (Union, types.UnionType):
+        for member in get_args(annotation):
+            yield from _alternatives(member)
+    elif annotation is not types.NoneType:
+        yield annotation
+
+
+def _members(annotation: Any, segment: str) -> Iterator[tuple[str | int, Any]]:
+    """Key in the JSON document and type of what `segment` names inside a value of this type."""
+    origin, arguments = get_origin(annotation), get_args(annotation)
+    if origin is dict:
+        yield segment, arguments[1]
+    elif origin in (list, tuple):
+        if segment.isdecimal():
+            repeated = origin is list or arguments[-1] is Ellipsis
+            if repeated or int(segment) < len(arguments):
+                yield int(segment), arguments[0 if repeated else int(segment)]
+    elif is_dataclass(annotation):
+        hints = get_type_hints(annotation)
+        if segment in hints:
+            yield segment, hints[segment]
+    elif isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        if segment in annotation.model_fields:
+            yield segment, annotation.model_fields[segment].annotation
+    elif annotation is Any:
+        yield segment, Any
+
+
+def _resolve(path: str, fields: Fields) -> Field:
+    first, *rest = path.split(".")
+    if first not in fields:
+        raise StoreInputError(f"where: unknown field {path!r}; fields are {', '.join(sorted(fields))}")
+    field = fields[first]
+    for segment in rest:
+        members = [member for kind in _alternatives(field.annotation) for member in _members(kind, segment)]
+        if not members:
+            hint = " (name one by its index, as in vesicles.0)" if _is_sequence(field.annotation) else ""
+            raise StoreInputError(f"where: unknown field {path!r}: there is no {segment!r}{hint}")
+        field = Field((*field.location, members[0][0]), Union[tuple(kind for _, kind in members)])  # noqa: UP007
+    return field
+
+
+def _is_sequence(annotation: Any) -> bool:
+    return any(get_origin(kind) in (list, tuple) for kind in _alternatives(annotation))
+
+
+def _parse(text: str, path: str, annotation: Any) -> Any:
+    try:
+        return TypeAdapter(annotation).validate_strings(text)
+    except ValidationError as error:
+        reason = error.errors()[0]["msg"]
+        raise StoreInputError(f"where: {text!r} is no value of {path}: {reason}") from error
+
+
+def _apparent_type(text: str) -> type:
+    """Type of a value to compare with a field that has no declared type."""
+    for kind in (float, bool):
+        try:
+            TypeAdapter(kind).validate_strings(text)
+        except ValidationError:
+            continue
+        return kind
+    return str
+
+
+def _joined(kinds: set[Any]) -> Any:
+    """Union of types, with literals joined to one so that a message lists all that is allowed."""
+    if all(get_origin(kind) is Literal for kind in kinds):
+        return Literal[tuple(sorted(word for kind in kinds for word in get_args(kind)))]
+    return Union[tuple(kinds)]  # noqa: UP007
+
+
+def _is_group(kind: Any) -> bool:
+    is_model = isinstance(kind, type) and issubclass(kind, BaseModel)
+    return is_model or is_dataclass(kind) or get_origin(kind) in (list, tuple, dict)
+
+
+def condition(text: str, document: InstrumentedAttribute[Any], fields: Fields) -> ColumnElement[bool]:
+    """Turn a filter into a condition on a JSON column.
+
+    A record without the quantity meets no comparison but ``= null``.
+
+    Parameters
+    ----------
+    text : str
+        ``path op value`` with op one of = != < <= > >=; text, true/false and null compare by = and != only.
+    document : column
+        JSON of the records.
+    fields : mapping
+        What a path may begin with.
+
+    Raises
+    ------
+    StoreInputError
+        If the filter is malformed, the field is unknown, or the value is none of its type.
+    """
+    match = PATTERN.fullmatch(text)
+    if match is None:
+        raise StoreInputError(f"where: {text!r} is not of the form path op value, op one of = != < <= > >=")
+    path, sign, value = match["path"], match["sign"], match["value"]
+    field = _resolve(path, fields)
+    element, compare = document[field.location], COMPARISONS[sign]
+    if value == "null" and sign in EQUALITIES:
+        stored = element.as_string()
+        return stored.is_(None) if sign == "=" else stored.is_not(None)
+
+    kinds = set(_alternatives(field.annotation))
+    if kinds == {Any}:
+        kinds = {_apparent_type(value)}
+    if any(_is_group(kind) for kind in kinds):
+        raise StoreInputError(f"where: {path} is a group of fields; compare one of them, or {path}=null")
+    if kinds <= {float, int}:
+        number = _parse(value, path, Union[tuple(kinds)])  # noqa: UP007
+        return and_(compare(element.as_float(), number), element.as_string().not_in(NON_FINITE))
+    if kinds == {datetime}:
+        return compare(element.as_string(), timestamp_text(_parse(value, path, datetime)))
+    if sign not in EQUALITIES:
+        raise StoreInputError(f"where: {path} is not a number and compares by = or != only")
+    if kinds == {bool}:
+        return compare(element.as_boolean(), _parse(value, path, bool))
+    return compare(element.as_string(), str(_parse(value, path, _joined(kinds))))
+
+
+def conditions(
+    where: Sequence[str], document: InstrumentedAttribute[Any], fields: Fields
+) -> list[ColumnElement[bool]]:
+    """Conditions of several filters, all of which a record has to meet."""
+    return [condition(text, document, fields) for text in where]

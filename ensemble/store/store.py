@@ -1,0 +1,257 @@
+"""The store as its users see it."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from pydantic import ValidationError
+from sqlalchemy.exc import DatabaseError
+
+from ensemble.boundary import Boundary
+from ensemble.disk import flush, flush_tree, locked
+from ensemble.record import RunSummary
+from ensemble.store.archive import read_run, write_run
+from ensemble.store.catalog import Catalog
+from ensemble.store.check import check_run
+from ensemble.store.errors import StoreInputError
+from ensemble.store.staging import Writer, abandoned
+from solver.run import Outcome, Run
+
+CATALOG = "catalog.sqlite"
+LOCK = "store.lock"
+
+
+@dataclass(frozen=True)
+class Staged:
+    """A run that is written but not committed.  It may be sent to the process that commits it."""
+
+    directory: Path
+    summary: RunSummary
+
+    @property
+    def key(self) -> str:
+        """Key of the run."""
+        return self.summary.key
+
+
+class Store:
+    """Runs and boundaries in a directory, for any number of processes and threads at once.
+
+    Get one from `Store.open` or `Store.existing` and use it as a context manager.  A process that stages runs
+    for another one to commit keeps its store open until they are committed: closing removes them.
+
+    Parameters
+    ----------
+    path : Path
+        The directory.
+    """
+
+    def __init__(self, path: Path) -> None:
+        # Resolved, so that a staged run means the same to a process in another working directory.
+        self.path = path.resolve()
+        self._runs = self.path / "runs"
+        self._staging = self.path / "staging"
+        self._lock = self.path / LOCK
+        self._catalog = Catalog(self.path / CATALOG)
+        self._writer = Writer(self._staging, self._lock)
+
+    @classmethod
+    def open(cls, path: Path) -> Self:
+        """Open a store to write to: create it if there is none, and sweep it.
+
+        Raises
+        ------
+        StoreInputError
+            If the path is a file, a directory with other contents, or cannot be created.
+        """
+        store = cls(path)
+        try:
+            store._create()
+            store.sweep()
+        except (OSError, DatabaseError) as error:
+            raise StoreInputError(f"store: {path} cannot be opened ({error})") from error
+        return store
+
+    @classmethod
+    def existing(cls, path: Path) -> Self:
+        """Open a store that must be there; nothing is created and nothing swept.
+
+        Raises
+        ------
+        StoreInputError
+            If there is no store at the path.
+        """
+        store = cls(path)
+        # Made last, so where it is the store is whole.
+        if not store._staging.is_dir():
+            raise StoreInputError(f"store: there is no store at {path}")
+        try:
+            store._catalog.keys()
+        except DatabaseError as error:
+            raise StoreInputError(f"store: {path} cannot be opened ({error})") from error
+        return store
+
+    def _create(self) -> None:
+        if self.path.exists() and not self.path.is_dir():
+            raise StoreInputError(f"store: {self.path} is a file; give a directory")
+        self.path.mkdir(parents=True, exist_ok=True)
+        # Sweeping removes what it does not know: a directory of anything else must never become a store.
+        foreign = {entry.name for entry in self.path.iterdir()} - {LOCK}
+        if foreign and not (self.path / CATALOG).exists():
+            raise StoreInputError(
+                f"store: {self.path} is no store and already holds {min(foreign)}; give a new directory"
+            )
+        with locked(self._lock):
+            self._catalog.create()
+            self._runs.mkdir(exist_ok=True)
+            self._staging.mkdir(exist_ok=True)
+            flush(self.path)
+
+    def close(self) -> None:
+        """Drop what this process staged and did not commit, and close the catalog."""
+        self._writer.close()
+        self._catalog.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def stage(self, run: Run) -> Staged:
+        """Write a run to disk without committing it; any process may."""
+        staged = Staged(self._writer.place(), RunSummary.of(run))
+        write_run(staged.directory, staged.summary, run)
+        flush_tree(staged.directory)
+        return staged
+
+    def commit(self, staged: Staged) -> str:
+        """Make a staged run exist, and return its key.
+
+        If the key exists already, that run stays and the staged copy is removed.
+        """
+        destination = self._runs / staged.key
+        with locked(self._lock):
+            if self.contains(staged.key):
+                shutil.rmtree(staged.directory, ignore_errors=True)
+                return staged.key
+            if destination.exists():
+                # Of a process that died between the rename and the catalog.
+                shutil.rmtree(destination)
+            os.rename(staged.directory, destination)
+            flush(self._runs)
+            self._catalog.insert(staged.summary)
+        return staged.key
+
+    def save(self, run: Run) -> str:
+        """Stage and commit a run, and return its key."""
+        return self.commit(self.stage(run))
+
+    def sweep(self) -> None:
+        """Remove what dead processes left behind."""
+        with locked(self._lock):
+            for leftover in self._leftovers():
+                shutil.rmtree(leftover)
+
+    def _leftovers(self) -> Iterator[Path]:
+        committed = self._catalog.keys()
+        yield from (entry for entry in self._runs.iterdir() if entry.name not in committed)
+        yield from abandoned(self._staging)
+
+    def contains(self, key: str) -> bool:
+        """Tell whether a run is committed."""
+        return self._catalog.document(key) is not None
+
+    def outcome(self, key: str) -> Outcome | None:
+        """Outcome of a committed run, None if there is none."""
+        document = self._catalog.document(key)
+        return None if document is None else Outcome(document["outcome"])
+
+    def summary(self, key: str) -> RunSummary:
+        """Everything about a committed run except its arrays.
+
+        Raises
+        ------
+        StoreInputError
+            If there is no such run.
+        """
+        document = self._catalog.document(key)
+        if document is None:
+            raise StoreInputError(f"run: there is no run {key} in {self.path}")
+        return RunSummary.model_validate(document)
+
+    def load(self, key: str) -> Run:
+        """Read a committed run; every number has the bits that were saved.
+
+        Raises
+        ------
+        StoreInputError
+            If there is no such run.
+        StoreError
+            If its files are damaged.
+        """
+        if not self.contains(key):
+            raise StoreInputError(f"run: there is no run {key} in {self.path}")
+        return read_run(self._runs / key)
+
+    def summaries(self, where: Sequence[str] = ()) -> list[RunSummary]:
+        """Summaries of the runs that meet all filters, oldest first.
+
+        Parameters
+        ----------
+        where : sequence of str
+            Filters ``path op value`` over the scene (``flow.rate>=0.5``, ``vesicles.0.reduced_area=0.9``,
+            ``adhesion=null``) and the results (``outcome!=bound``, ``viscosity.total<2``).
+
+        Raises
+        ------
+        StoreInputError
+            If a filter is malformed, or its field or value is none.
+        """
+        return self._catalog.summaries(where)
+
+    def save_boundary(self, boundary: Boundary) -> None:
+        """Insert a boundary, or replace the one of the same study, at once."""
+        with locked(self._lock):
+            self._catalog.put_boundary(boundary)
+
+    def boundaries(self, where: Sequence[str] = ()) -> list[Boundary]:
+        """Boundaries that meet all filters, such as ``name=critical-hamaker``; the latest change last.
+
+        Raises
+        ------
+        StoreInputError
+            If a filter is malformed, or its field or value is none.
+        """
+        return self._catalog.boundaries(where)
+
+    def check(self) -> list[str]:
+        """Verify every run and boundary.
+
+        Returns
+        -------
+        list of str
+            Problems, one sentence each; empty if the store is whole and holds no leftovers.
+        """
+        try:
+            summaries = self.summaries()
+            self.boundaries()
+        except (DatabaseError, ValidationError) as error:
+            return [f"the catalog cannot be read ({error})"]
+        problems = [
+            problem for summary in summaries for problem in check_run(self._runs / summary.key, summary)
+        ]
+        with locked(self._lock):
+            problems += [f"{leftover.relative_to(self.path)} is a leftover" for leftover in self._leftovers()]
+        return problems
