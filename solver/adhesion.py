@@ -56,9 +56,7 @@ class Adhesion:
             density[:, target] += force
         return density
 
-    def jacobian(
-        self, geometry: Geometry, closeness: Closeness, dx: Array, dy: Array
-    ) -> tuple[Array, Array]:
+    def jacobian(self, geometry: Geometry, closeness: Closeness, dx: Array, dy: Array) -> tuple[Array, Array]:
         """Derivatives of both components by the state, (M·N, state) each, given those of the points."""
         membranes = geometry.membranes
         points = membranes.points

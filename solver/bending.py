@@ -1,4 +1,4 @@
-"""Bending force of a membrane with the Helfrich energy ½κ∫curvature² ds: f = −κ x_ssss (paper, section II)."""
+"""Bending of a membrane with the Helfrich energy ½κ∫curvature² ds: f = −κ x_ssss (paper, section II)."""
 
 from __future__ import annotations
 

@@ -35,7 +35,8 @@ def positions(tangent_angle: Array, center: Array, length: float | Array) -> Arr
     """
     matrix = integration(tangent_angle.shape[-1])
     scale = np.asarray(length)[..., None, None] / (2 * np.pi)
-    return cast(Array, np.asarray(center)[..., None] + scale * (tangents(tangent_angle) @ matrix.T))
+    points: Array = np.asarray(center)[..., None] + scale * (tangents(tangent_angle) @ matrix.T)
+    return points
 
 
 def area(points: Array, tangent_angle: Array, length: float | Array) -> Array:

@@ -11,7 +11,7 @@ from solver import curve, scene
 from solver.dynamics import Dynamics, Motion
 from solver.orbit import Orbit
 from solver.proximity import gap
-from solver.rheology import membrane_stress, shear_stress
+from solver.rheology import adhesion_stress, membrane_stress
 from solver.run import Frames, Series
 from solver.spectral import tail
 
@@ -23,7 +23,8 @@ def areas(motion: Motion) -> Array:
     """Area of each vesicle, (M,)."""
     geometry = motion.geometry
     points, tangents = geometry.points, geometry.tangents
-    return 0.5 * geometry.membranes.length * np.mean(points[0] * tangents[1] - points[1] * tangents[0], axis=1)
+    moment = np.mean(points[0] * tangents[1] - points[1] * tangents[0], axis=1)
+    return np.asarray(0.5 * geometry.membranes.length * moment)
 
 
 def steady_speed(motion: Motion) -> float:
@@ -57,10 +58,7 @@ def measures(setting: scene.Scene, dynamics: Dynamics) -> dict[str, Measure]:
         scale = 1 / (setting.flow.rate * target_area.sum())
         found["viscosity_bending_tension"] = lambda motion: scale * membrane_stress(motion)
         if adhesion:
-            found["viscosity_adhesion"] = lambda motion: scale * shear_stress(
-                motion.geometry,
-                motion.adhesion,  # type: ignore[arg-type]  # present whenever the term is
-            )
+            found["viscosity_adhesion"] = lambda motion: scale * adhesion_stress(motion)
     return found
 
 
@@ -109,9 +107,9 @@ class Recorder:
     def _frame_is_due(self, time: float) -> bool:
         if not self._frames:
             return True
-        last = self._frames[-1][0]
         # Round-off in a multiple of the interval must not skip a frame.
-        return bool(np.floor(time / self._frame_interval + 1e-9) > np.floor(last / self._frame_interval + 1e-9))
+        due, last = (np.floor(t / self._frame_interval + 1e-9) for t in (time, self._frames[-1][0]))
+        return bool(due > last)
 
     @property
     def series(self) -> Series:

@@ -118,8 +118,8 @@ class Dynamics:
     def jacobian(self, state: Array) -> Array:
         """Derivative of `rate` with the kernel of the single-layer potential held fixed.
 
-        Shape (state_size, state_size).  Dropped are the derivatives of S and of the gliding direction; kept are
-        those of all forces, the tension's direction, the constraint and the flow.
+        Shape (state_size, state_size).  Dropped are the derivatives of S and of the gliding direction; kept
+        are those of all forces, the tension's direction, the constraint and the flow.
         """
         motion = self.motion(state)
         geometry = motion.geometry
@@ -203,7 +203,8 @@ def gliding_speed(curvature: Array, turning: Array) -> Array:
     """Speed at which the points glide along each membrane so that their tangent angles change least, (M, 1).
 
     With a speed c added along the tangent, θ_t = n · u_s + c θ_s.  Least squares over the part of θ_t that
-    varies along the membrane: c = −⟨w̃, κ̃⟩/⟨κ̃, κ̃⟩, w̃ and κ̃ being n · u_s and the curvature without their means.
+    varies along the membrane: c = −⟨w̃, κ̃⟩/⟨κ̃, κ̃⟩, w̃ and κ̃ being n · u_s and the curvature, each without its
+    mean.
     """
     return np.sum(_gliding_direction(curvature) * turning, axis=-1, keepdims=True)
 

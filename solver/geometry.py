@@ -48,7 +48,7 @@ class Membranes:
 
     @property
     def state_size(self) -> int:
-        """Length of the state vector: a tangent angle a point and two coordinates of the center, per vesicle."""
+        """Length of the state vector: per vesicle N tangent angles and 2 coordinates of the center."""
         return self.count * (self.points + 2)
 
     def pack(self, tangent_angle: Array, center: Array) -> Array:

@@ -8,11 +8,16 @@ from the number's bits.
 from __future__ import annotations
 
 from functools import partial
+from typing import Any
 
 import numpy as np
 from llvmlite import ir
 from numba import njit, types
 from numba.extending import intrinsic
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 
 # Without "ninf" and "nnan": a run that diverges must show it.
 compiled = partial(
@@ -21,20 +26,20 @@ compiled = partial(
 
 
 @intrinsic
-def _bits_of(typing_context, value):  # type: ignore[no-untyped-def]
+def _bits_of(typing_context: Any, value: Any) -> Any:
     """The 64 bits of a double, as an integer."""
 
-    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return builder.bitcast(arguments[0], ir.IntType(64))
 
     return types.int64(types.float64), generate
 
 
 @intrinsic
-def _double_of(typing_context, bits):  # type: ignore[no-untyped-def]
+def _double_of(typing_context: Any, bits: Any) -> Any:
     """The double with these 64 bits."""
 
-    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return builder.bitcast(arguments[0], ir.DoubleType())
 
     return types.float64(types.int64), generate
@@ -46,7 +51,7 @@ _SQRT_HALF_BITS = 0x3FE6A09E667F3BCD
 
 
 @compiled(inline="always")
-def logarithm(x):  # type: ignore[no-untyped-def]
+def logarithm(x: float) -> float:
     """Natural logarithm of a positive normal double, to 3e-16.
 
     x = 2^e·m with m in [√½, √2); log m = 2 artanh(z), z = (m−1)/(m+1), as an odd polynomial: |z| ≤ 0.1716,
@@ -70,7 +75,7 @@ def logarithm(x):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def stokeslets(targets, sources, xx, xy, yy):  # type: ignore[no-untyped-def]
+def stokeslets(targets: Array, sources: Array, xx: Array, xy: Array, yy: Array) -> None:
     """Fill the components (m, n) of (−log r I + r⊗r/r²)/4π from ``sources`` (2, n) to ``targets`` (2, m).
 
     Where a target is its own source the entries are meaningless and the caller's to overwrite.
@@ -90,7 +95,9 @@ def stokeslets(targets, sources, xx, xy, yy):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def complete_self_part(regular_part, diagonal, tangents, first, xx, xy, yy):  # type: ignore[no-untyped-def]
+def complete_self_part(
+    regular_part: Array, diagonal: float, tangents: Array, first: int, xx: Array, xy: Array, yy: Array
+) -> None:
     """Turn point Stokeslets of one closed curve on itself into its single-layer quadrature.
 
     Parameters
@@ -118,7 +125,17 @@ def complete_self_part(regular_part, diagonal, tangents, first, xx, xy, yy):  # 
 
 
 @compiled
-def refine_stokeslets(targets, sources, interpolation, rows, first_row, first_column, xx, xy, yy):  # type: ignore[no-untyped-def]
+def refine_stokeslets(
+    targets: Array,
+    sources: Array,
+    interpolation: Array,
+    rows: Indices,
+    first_row: int,
+    first_column: int,
+    xx: Array,
+    xy: Array,
+    yy: Array,
+) -> None:
     """Replace rows of one vesicle's block by those of the refined source, folded back onto its own points.
 
     Parameters
@@ -149,8 +166,8 @@ def refine_stokeslets(targets, sources, interpolation, rows, first_row, first_co
 
 
 @compiled
-def distances(targets, sources, tangents, spacing, out):  # type: ignore[no-untyped-def]
-    """Distance of every target (2, m) to the curve through ``sources`` (2, n), to second order in ``spacing``.
+def distances(targets: Array, sources: Array, tangents: Array, spacing: float, out: Array) -> None:
+    """Distance of every target (2, m) to the curve through ``sources`` (2, n), to order ``spacing``².
 
     The curve is replaced by its tangent segments of length ``spacing`` at the nearest point.
     """
@@ -172,7 +189,7 @@ def distances(targets, sources, tangents, spacing, out):  # type: ignore[no-unty
 
 
 @compiled
-def pair_distances(points, tangents, spacing, out):  # type: ignore[no-untyped-def]
+def pair_distances(points: Array, tangents: Array, spacing: Array, out: Array) -> None:
     """`distances` for all ordered pairs: out[a, b, i] is that of point i of vesicle a to vesicle b.
 
     points, tangents : (2, M, N); spacing : (M,); out : (M, M, N), its diagonal left alone
@@ -190,7 +207,9 @@ def pair_distances(points, tangents, spacing, out):  # type: ignore[no-untyped-d
 
 
 @compiled(inline="always")
-def _powers(dx, dy, square, m, n, inverse, high, low):  # type: ignore[no-untyped-def]
+def _powers(
+    dx: Array, dy: Array, square: float, m: int, n: int, inverse: Array, high: Array, low: Array
+) -> None:
     """Write 1/r², (δ/r)^m and (δ/r)^n for offsets (dx, dy) of one row, δ² = ``square``.
 
     The exponents are known only at run time, so each multiplication is a loop of its own over the row.
@@ -215,8 +234,10 @@ def _powers(dx, dy, square, m, n, inverse, high, low):  # type: ignore[no-untype
 
 
 @compiled
-def adhesion_force(targets, sources, distance, m, n, scale, out):  # type: ignore[no-untyped-def]
-    """Write scale·Σ (x−y)/r² [(δ/r)^m − (δ/r)^n] over ``sources`` (2, s) to out (2, t) for ``targets`` (2, t)."""
+def adhesion_force(
+    targets: Array, sources: Array, distance: float, m: int, n: int, scale: float, out: Array
+) -> None:
+    """Write scale·Σ (x−y)/r² [(δ/r)^m − (δ/r)^n] over ``sources`` (2, s) to out (2, t) for each target."""
     dx, dy, inverse, high, low = np.empty((5, sources.shape[1]))
     for i in range(targets.shape[1]):
         for j in range(sources.shape[1]):
@@ -234,7 +255,7 @@ def adhesion_force(targets, sources, distance, m, n, scale, out):  # type: ignor
 
 
 @compiled
-def adhesion_energy(targets, sources, distance, m, n):  # type: ignore[no-untyped-def]
+def adhesion_energy(targets: Array, sources: Array, distance: float, m: int, n: int) -> float:
     """Σ Σ (δ/r)^m − (m/n)(δ/r)^n over ``targets`` (2, t) and ``sources`` (2, s)."""
     dx, dy, inverse, high, low = np.empty((5, sources.shape[1]))
     ratio = m / n
@@ -250,7 +271,17 @@ def adhesion_energy(targets, sources, distance, m, n):  # type: ignore[no-untype
 
 
 @compiled
-def adhesion_hessian(targets, sources, distance, m, n, scale, xx, xy, yy):  # type: ignore[no-untyped-def]
+def adhesion_hessian(
+    targets: Array,
+    sources: Array,
+    distance: float,
+    m: int,
+    n: int,
+    scale: float,
+    xx: Array,
+    xy: Array,
+    yy: Array,
+) -> None:
     """Fill the components (t, s) of the derivative of each pair's force by the target's position."""
     dx, dy, inverse, high, low = np.empty((5, sources.shape[1]))
     for i in range(targets.shape[1]):

@@ -24,7 +24,7 @@ MAXIMUM_FACTOR = 32
 
 @cache
 def required_ratio(order: float, tolerance: float) -> float:
-    """Smallest distance/spacing at which the trapezoid rule of 1/(s² + d²)^order is accurate to ``tolerance``."""
+    """Smallest distance/spacing at which the trapezoid rule integrates 1/(s² + d²)^order to ``tolerance``."""
     nu = order - 0.5
 
     def excess(z: float) -> float:
@@ -37,7 +37,7 @@ def required_ratio(order: float, tolerance: float) -> float:
 
 
 def refinement_factors(distance_per_spacing: Array, ratio: float) -> NDArray[np.int64]:
-    """Powers of two by which sources are to be refined so that distance/spacing reaches ``ratio``, at most 32."""
+    """Powers of two, at most 32, that refine the sources so far that distance/spacing reaches ``ratio``."""
     needed = ratio / np.maximum(distance_per_spacing, ratio / MAXIMUM_FACTOR)
     factors: NDArray[np.int64] = 2 ** np.ceil(np.log2(np.maximum(needed, 1.0)) - 1e-9).astype(np.int64)
     return factors

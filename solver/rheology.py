@@ -1,7 +1,7 @@
 """Intrinsic viscosity of a dilute suspension in shear.
 
-With f the force of the membrane on the fluid, [μ] = −1/(rate·area) ∫ f_x y ds averaged over time; area is that
-of all vesicles (paper, section V; the sign follows from f).
+With f the force of the membrane on the fluid, [μ] = −1/(rate·area) ∫ f_x y ds averaged over time; area is
+that of all vesicles (paper, section V; the sign follows from f).
 """
 
 from __future__ import annotations
@@ -26,3 +26,9 @@ def membrane_stress(motion: Motion) -> float:
     geometry = motion.geometry
     tension_force = geometry.arclength_derivative(motion.tension * geometry.tangents)
     return shear_stress(geometry, motion.bending + tension_force)
+
+
+def adhesion_stress(motion: Motion) -> float:
+    """The part of the shear stress that adhesion causes; for a scene with adhesion."""
+    assert motion.adhesion is not None
+    return shear_stress(motion.geometry, motion.adhesion)

@@ -71,10 +71,11 @@ class Work:
     wall_seconds: float
 
 
-# Diagnostics by name, each of shape (time,) and sampled at `Series["time"]`.  Always present: time, bending_energy,
-# area_error, closure_error.  With two or more vesicles: gap.  With exactly two: center_distance,
-# center_angle (of the line of centers, radians, unwrapped).  With adhesion: adhesion_energy.  In shear:
-# viscosity_bending_tension and, with adhesion, viscosity_adhesion.  One vesicle: inclination_angle (radians).
+# Diagnostics by name, each of shape (time,) and sampled at `Series["time"]`.  Always present: time,
+# bending_energy, area_error, closure_error, steady_speed.  With two or more vesicles: gap.  With exactly two:
+# center_distance, center_angle (of the line of centers, radians, unwrapped).  With adhesion:
+# adhesion_energy.  In shear: viscosity_bending_tension and, with adhesion, viscosity_adhesion.  With one
+# vesicle: inclination_angle (radians).
 Series = Mapping[str, Array]
 
 

@@ -191,7 +191,7 @@ def _inclination(scene: Scene, series: Series) -> float | None:
 
 
 def _viscosity(series: Series, outcome: Outcome, orbit: Orbit | None) -> Viscosity | None:
-    """Average over the last full turn of a pair, or the value in the steady state; None while neither exists."""
+    """Average over a pair's last full turn, or the value in the steady state; None while neither exists."""
     if "viscosity_bending_tension" not in series:
         return None
     if outcome is Outcome.STEADY:

@@ -22,9 +22,9 @@ def _frozen(matrix: Array) -> Array:
     return matrix
 
 
-def _convolution(symbol: NDArray[np.complex128]) -> Array:
+def _convolution(symbol: NDArray[np.complexfloating]) -> Array:
     """The circulant matrix whose eigenvalue on exp(ikα) is ``symbol[k]``, in FFT order."""
-    return _frozen(circulant(np.fft.ifft(symbol).real))
+    return _frozen(circulant(np.fft.ifft(symbol).real).astype(np.float64))
 
 
 def wavenumbers(points: int) -> Array:
@@ -32,7 +32,7 @@ def wavenumbers(points: int) -> Array:
 
     On an even number of points that mode has no sign, so an odd derivative of it vanishes.
     """
-    k = np.fft.fftfreq(points, 1 / points)
+    k: Array = np.fft.fftfreq(points, 1 / points)
     k[points // 2] = 0
     return k
 

@@ -24,7 +24,7 @@ def placed_state(scene: Scene) -> Array:
 
 
 def turned_state(membranes: Membranes, state: Array, tilt: float) -> Array:
-    """Two vesicles turned so that the line of centers lies along y plus ``tilt`` radians, its middle at the origin."""
+    """Two vesicles about the origin with their line of centers along y, plus ``tilt`` radians."""
     tangent_angle, center = membranes.tangent_angle(state), membranes.center(state)
     offset = center[1] - center[0]
     turn = np.pi / 2 + tilt - np.arctan2(offset[1], offset[0])

@@ -33,9 +33,21 @@ class TensionNotFoundError(ArithmeticError):
 
 
 @compiled
-def _conjugate_gradients(  # type: ignore[no-untyped-def]
-    xx, xy, yy, tangents, derivative, rate, spacing, inverse, stretching, tolerance, limit, tension, velocity
-):
+def _conjugate_gradients(
+    xx: Array,
+    xy: Array,
+    yy: Array,
+    tangents: Array,
+    derivative: Array,
+    rate: Array,
+    spacing: Array,
+    inverse: Array,
+    stretching: Array,
+    tolerance: float,
+    limit: int,
+    tension: Array,
+    velocity: Array,
+) -> int:
     """Solve for the tension; return the number of iterations, or −1 if ``limit`` was not enough.
 
     ``derivative`` is the transposed differentiation matrix; ``rate`` (M, 1) = 2π/length; ``stretching``
@@ -154,10 +166,11 @@ class Inextensibility:
             block = slice(vesicle * points, (vesicle + 1) * points)
             system[block, block] += shift
         # Differentiation loses the highest mode; give its tension the weight of its neighbors.
+        typical = np.trace(system) / (count * points)
         alternating = np.where(np.arange(points) % 2 == 0, 1.0, -1.0)
         for vesicle in range(count):
             block = slice(vesicle * points, (vesicle + 1) * points)
-            system[block, block] += np.outer(alternating, alternating) * np.trace(system) / (count * points**2)
+            system[block, block] += np.outer(alternating, alternating) * typical / points
         factor, failed = lapack.dpotrf(system, lower=1)
         if failed:
             raise TensionNotFoundError("the tension operator is not positive: the membrane is too distorted")

@@ -17,8 +17,8 @@ from solver.integrators.base import Step, StepFailedError
 Array = NDArray[np.float64]
 
 
-# Newton's iteration stops when its error is this fraction of the step's tolerance.  SciPy's own choice, the root
-# of the tolerance, costs half as many evaluations again at 1e-4 for a period that is no more accurate.
+# Newton's iteration stops when its error is this fraction of the step's tolerance.  SciPy's own choice, the
+# root of the tolerance, costs half as many evaluations again at 1e-4, for a period that is no more accurate.
 _NEWTON_TOLERANCE = 0.1
 
 
