@@ -62,16 +62,15 @@ class Dynamics:
         """The terms of a scene."""
         membranes = Membranes.of(scene.vesicles, scene.numerics.points)
         several = membranes.count > 1
-        # Below the time integrator's tolerance, so that neither sums nor iterations limit its step.
-        quadrature = float(np.clip(1e-3 * scene.numerics.tolerance, 1e-12, 1e-7))
-        iteration = float(np.clip(1e-4 * scene.numerics.tolerance, 1e-12, 1e-8))
+        # Of sums and iterations; so far below the time integrator's that they do not limit its step.
+        accuracy = float(np.clip(1e-3 * scene.numerics.tolerance, 1e-12, 1e-7))
         return cls(
             membranes=membranes,
             bending=Bending(),
-            adhesion=Adhesion(scene.adhesion, quadrature) if scene.adhesion and several else None,
+            adhesion=Adhesion(scene.adhesion, accuracy) if scene.adhesion and several else None,
             flow=imposed_flow(scene.flow) if scene.flow else None,
-            inextensibility=Inextensibility(iteration),
-            layer=SingleLayer(membranes, quadrature),
+            inextensibility=Inextensibility(accuracy),
+            layer=SingleLayer(membranes, accuracy),
         )
 
     def motion(self, state: Array) -> Motion:
@@ -105,7 +104,7 @@ class Dynamics:
         turning += gliding_speed(curvature, turning) * curvature
         highest = highest_modes(self.membranes.points)
         turning -= (turning @ highest) @ highest.T
-        return np.concatenate([turning.ravel(), motion.velocity.mean(axis=2).ravel()])
+        return np.concatenate([turning.ravel(), motion.velocity.sum(axis=2).ravel() / self.membranes.points])
 
     @staticmethod
     def _turning(motion: Motion) -> Array:

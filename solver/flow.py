@@ -34,7 +34,8 @@ class LinearFlow:
 
     def velocity(self, geometry: Geometry) -> Array:
         """See `ImposedFlow`."""
-        return np.tensordot(self.gradient, geometry.points, axes=1)
+        points = geometry.points
+        return (self.gradient @ points.reshape(2, -1)).reshape(points.shape)
 
     def jacobian(self, dx: Array, dy: Array) -> tuple[Array, Array]:
         """See `ImposedFlow`."""

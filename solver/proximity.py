@@ -43,12 +43,16 @@ class Closeness:
         distance /= membranes.spacing[:, None]
         return distance
 
+    @cached_property
+    def _nearest(self) -> Array:
+        """Least of the distances, (target, source)."""
+        return self._distances.min(axis=-1)
+
     def refinements(self, target: int, source: int, ratio: float) -> Iterator[Refinement]:
         """Refinements with which no target point is nearer than ``ratio`` spacings of the source."""
-        distance = self._distances[target, source]
-        if distance.min() >= ratio:
+        if self._nearest[target, source] >= ratio:
             return
-        factors = refinement_factors(distance, ratio)
+        factors = refinement_factors(self._distances[target, source], ratio)
         points = self._geometry.membranes.points
         for factor in set(factors.tolist()) - {1}:
             rows = np.flatnonzero(factors == factor)

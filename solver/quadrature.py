@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.special import gammaln, kve
 
+from solver.kernels import compiled
+
 Array = NDArray[np.float64]
 
 MAXIMUM_FACTOR = 32
@@ -36,8 +38,11 @@ def required_ratio(order: float, tolerance: float) -> float:
     return float(brentq(excess, lowest, 1e3)) / (2 * np.pi)
 
 
+@compiled
 def refinement_factors(distance_per_spacing: Array, ratio: float) -> NDArray[np.int64]:
     """Powers of two, at most 32, that refine the sources so far that distance/spacing reaches ``ratio``."""
-    needed = ratio / np.maximum(distance_per_spacing, ratio / MAXIMUM_FACTOR)
-    factors: NDArray[np.int64] = 2 ** np.ceil(np.log2(np.maximum(needed, 1.0)) - 1e-9).astype(np.int64)
+    factors = np.ones(distance_per_spacing.size, dtype=np.int64)
+    for i in range(factors.size):
+        while factors[i] < MAXIMUM_FACTOR and factors[i] * distance_per_spacing[i] < ratio:
+            factors[i] *= 2
     return factors

@@ -32,7 +32,7 @@ def wavenumbers(points: int) -> Array:
 
     On an even number of points that mode has no sign, so an odd derivative of it vanishes.
     """
-    k: Array = np.fft.fftfreq(points, 1 / points)
+    k = np.fft.fftfreq(points, 1 / points).astype(np.float64)
     k[points // 2] = 0
     return k
 

@@ -83,9 +83,9 @@ class SingleLayer:
 
     def velocity(self, point_forces: Array) -> Array:
         """Velocity (2, M, N) that point forces (2, M, N) cause at the membranes' points."""
-        return np.stack(self.columns(point_forces[0].ravel(), point_forces[1].ravel())).reshape(
-            point_forces.shape
-        )
+        velocity = np.empty_like(point_forces)
+        velocity[0].flat, velocity[1].flat = self.columns(point_forces[0].ravel(), point_forces[1].ravel())
+        return velocity
 
     def columns(self, fx: Array, fy: Array) -> tuple[Array, Array]:
         """Velocity components for several point forces at once, (M·N, ...) each."""
