@@ -1,0 +1,298 @@
+"""The command line.
+
+Every command imports what it needs when it is called: no command waits for libraries it does not use.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from enum import StrEnum
+from importlib.metadata import entry_points
+from pathlib import Path
+from statistics import fmean
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ensemble.errors import BadInput
+from ensemble.mpi import launched_rank, only_first_rank_speaks, pin_threads
+
+if TYPE_CHECKING:
+    from mpi4py.MPI import Intracomm
+    from rich.table import Table
+
+    from ensemble.boundary import Boundary
+    from ensemble.scheduler import Traced
+    from ensemble.store import Store
+    from ensemble.study import Study
+
+DEFAULT_STORE = Path("ensemble-store")
+DEFAULT_STUDY = "critical-hamaker"
+COMMANDS = "ensemble.commands"  # entry point group: functions that other packages add as commands
+
+Changes = Annotated[
+    list[str],
+    typer.Option(
+        "--set", metavar="PATH=VALUE", help="Change a field: dotted path and TOML value.  Repeatable."
+    ),
+]
+StorePath = Annotated[Path, typer.Option("--store", metavar="DIR", help="Directory of the store.")]
+Filters = Annotated[
+    list[str],
+    typer.Option(metavar="CONDITION", help="For example flow.rate>=0.5 or outcome=bound.  Repeatable."),
+]
+AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
+
+app = typer.Typer(
+    help="When do two adhering vesicles stay together in a flow?",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+
+class Kind(StrEnum):
+    """What a store can be asked for."""
+
+    RUNS = "runs"
+    BOUNDARIES = "boundaries"
+
+
+def main() -> None:
+    """Run the command line; exit status 2 and one message for bad input."""
+    pin_threads()
+    for command in entry_points(group=COMMANDS):
+        app.command(command.name)(command.load())
+    with only_first_rank_speaks():
+        try:
+            app(prog_name="ensemble")
+        except BadInput as error:
+            print(f"ensemble: {error}", file=sys.stderr)
+            sys.exit(2)
+
+
+@app.command()
+def bisect(
+    study: Annotated[str, typer.Argument(help="Name of a preset, or a TOML file.")] = DEFAULT_STUDY,
+    changes: Changes = [],  # noqa: B006  typer copies it
+    store: StorePath = DEFAULT_STORE,
+    tolerance: Annotated[float | None, typer.Option(help="Relative width of the brackets.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Trace a boundary, on all ranks, running only what the store does not have.
+
+    The exit status is 0 only if every search converged.
+    """
+    from ensemble.documents import study_document
+    from ensemble.mpi import abort_guard, on_root, world
+    from ensemble.search import Status
+    from ensemble.tables import boundary_table
+
+    communicator = world()
+    with abort_guard(communicator):
+        prepared = on_root(communicator, lambda: _prepare(study, changes, tolerance, store))
+        traced = _trace(communicator, prepared, store)
+    if as_json:
+        _print_json(study_document(traced, store))
+    else:
+        _print_table(boundary_table(traced.boundary))
+        print(_cost(traced))
+    converged = all(point.status == Status.CONVERGED for point in traced.boundary.points)
+    raise typer.Exit(0 if converged else 1)
+
+
+def _prepare(study: str, changes: list[str], tolerance: float | None, store: Path) -> Study:
+    """Load the study, then create or sweep the store: a study that is refused leaves no trace."""
+    from ensemble.store import Store
+    from ensemble.study import load_study
+
+    with _refusing():
+        loaded = load_study(study, changes, tolerance)
+        Store.open(store).close()
+    return loaded
+
+
+def _trace(communicator: Intracomm, study: Study, path: Path) -> Traced:
+    from rich.console import Console
+
+    from ensemble.progress import study_progress
+    from ensemble.scheduler import trace
+    from ensemble.store import Store
+
+    with Store.existing(path) as store, study_progress(Console(stderr=True)) as show:
+        return trace(communicator, study, store, show)
+
+
+def _cost(traced: Traced) -> str:
+    cost = f"{traced.runs} runs in {traced.wall_seconds:.1f} s"
+    if not traced.busy_fractions:
+        return cost
+    mean, least = fmean(traced.busy_fractions), min(traced.busy_fractions)
+    return f"{cost}; ranks busy {mean:.1%} of the time on average, {least:.1%} at least"
+
+
+@app.command()
+def run(
+    scene: Annotated[str, typer.Argument(help="Name of a preset, or a TOML file.")],
+    changes: Changes = [],  # noqa: B006
+    store: Annotated[Path | None, typer.Option(metavar="DIR", help="Keep the run in this store.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Simulate one scene.  The exit status is 1 if the simulation failed numerically."""
+    if launched_rank() != 0:
+        return
+    from rich.console import Console
+
+    from ensemble.documents import run_document
+    from ensemble.progress import run_progress
+    from ensemble.record import RunSummary
+    from ensemble.study import load_scene
+    from ensemble.tables import run_table
+    from solver import Outcome, simulate
+
+    with ExitStack() as stack:
+        with _refusing():
+            loaded = load_scene(scene, changes)
+            keep = None if store is None else stack.enter_context(_opened(store))
+        finished = simulate(loaded, on_progress=stack.enter_context(run_progress(Console(stderr=True))))
+        if keep is not None:
+            keep.save(finished)
+    document = run_document(RunSummary.of(finished))
+    if as_json:
+        _print_json(document)
+    else:
+        _print_table(run_table(document))
+    raise typer.Exit(1 if finished.outcome is Outcome.FAILED else 0)
+
+
+@app.command()
+def query(
+    kind: Annotated[Kind, typer.Argument(help="What to list.")],
+    where: Filters = [],  # noqa: B006
+    store: StorePath = DEFAULT_STORE,
+    as_json: AsJson = False,
+) -> None:
+    """List the runs or the boundaries of a store."""
+    from ensemble.tables import boundaries_table, runs_table
+
+    with _refusing(), _existing(store) as opened:
+        if kind is Kind.RUNS:
+            runs = opened.summaries(where)
+            documents, table = [summary.document() for summary in runs], runs_table(runs)
+        else:
+            boundaries = opened.boundaries(where)
+            documents = [boundary.model_dump(mode="json") for boundary in boundaries]
+            table = boundaries_table(boundaries)
+    if as_json:
+        _print_json(documents)
+    else:
+        _print_table(table)
+
+
+@app.command()
+def show(
+    name: Annotated[str, typer.Argument(metavar="RUN|BOUNDARY", help="Key of either, or a boundary's name.")],
+    output: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Draw it to this file: .png, .svg or .pdf.")
+    ] = None,
+    store: StorePath = DEFAULT_STORE,
+) -> None:
+    """Print a run or a boundary, or draw it to a file."""
+    from ensemble.documents import run_document
+    from ensemble.tables import boundary_table, run_table
+
+    with _refusing(), _existing(store) as opened:
+        boundary = _boundary(opened, name)
+        if output is not None:
+            _draw(opened, boundary or name, output)
+        elif boundary is not None:
+            _print_table(boundary_table(boundary))
+        else:
+            _print_table(run_table(run_document(opened.summary(name))))
+
+
+def _boundary(store: Store, name: str) -> Boundary | None:
+    """The boundary with this key, or the one with this name that changed last."""
+    named = [boundary for boundary in store.boundaries() if name in (boundary.study_key, boundary.name)]
+    return named[-1] if named else None
+
+
+def _draw(store: Store, shown: Boundary | str, output: Path) -> None:
+    from ensemble.figures import phase_diagram, run_figure, save
+    from ensemble.parameters import parameter_value
+
+    if isinstance(shown, str):
+        save(run_figure(store.load(shown)), output)
+        return
+    runs = []
+    for point in shown.points:
+        (at,) = point.parameters.values()
+        for key in point.runs:
+            summary = store.summary(key)
+            value = parameter_value(summary.scene, shown.study["search"]["parameter"])
+            runs.append((at, value, summary.outcome))
+    save(phase_diagram(shown, runs), output)
+
+
+@app.command()
+def check(store: StorePath = DEFAULT_STORE, as_json: AsJson = False) -> None:
+    """Verify every run and boundary of a store; the exit status is 1 if anything is wrong."""
+    with _refusing(), _existing(store) as opened:
+        problems = opened.check()
+    if as_json:
+        _print_json({"store": str(store), "problems": problems})
+    else:
+        print("\n".join(problems) or f"{store} is whole")
+    raise typer.Exit(1 if problems else 0)
+
+
+@app.command()
+def export(
+    key: Annotated[str, typer.Argument(metavar="RUN", help="Key of the run.")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="HDF5 file to write.")],
+    store: StorePath = DEFAULT_STORE,
+) -> None:
+    """Write a run to a single HDF5 file."""
+    import ensemble.checkpoint
+
+    with _refusing(), _existing(store) as opened:
+        ensemble.checkpoint.export(opened.summary(key), opened.load(key), file)
+
+
+def _existing(path: Path) -> Store:
+    from ensemble.store import Store
+
+    return Store.existing(path)
+
+
+def _opened(path: Path) -> Store:
+    from ensemble.store import Store
+
+    return Store.open(path)
+
+
+@contextmanager
+def _refusing() -> Iterator[None]:
+    """Turn what the packages say about unusable input into `BadInput`."""
+    try:
+        yield
+    except (ValueError, OSError) as error:
+        raise BadInput(str(error)) from error
+
+
+def _print_json(document: Any) -> None:
+    # JSON has no word for NaN or infinity.
+    print(json.dumps(document, indent=2, allow_nan=False))
+
+
+def _print_table(table: Table) -> None:
+    from rich.console import Console
+
+    Console().print(table)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,147 @@
+"""The edge to MPI: the world communicator, the launcher's view of it, and ending a job as a whole.
+
+Only the command line calls `world`; everything else takes its communicator as an argument.  mpi4py is
+imported when a communicator is asked for, so commands that need none run where no MPI is installed.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+import time
+import traceback
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout
+from typing import TYPE_CHECKING, TypeVar
+
+from ensemble.errors import BadInput
+
+if TYPE_CHECKING:
+    from mpi4py.MPI import Intracomm
+
+T = TypeVar("T")
+
+# What launchers tell their processes, most specific first: an mpirun inside a Slurm step overrides the step.
+_SIZE_VARIABLES = ("PMI_SIZE", "OMPI_COMM_WORLD_SIZE", "MV2_COMM_WORLD_SIZE", "SLURM_STEP_NUM_TASKS")
+_RANK_VARIABLES = ("PMI_RANK", "OMPI_COMM_WORLD_RANK", "MV2_COMM_WORLD_RANK", "SLURM_PROCID")
+
+_THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+
+_PARENT_CHECK_SECONDS = 0.5
+_FORWARD_SECONDS = 0.3
+
+
+def pin_threads() -> None:
+    """Give BLAS and Numba one thread in this process, unless the environment already says otherwise.
+
+    The libraries read these variables when they are loaded, so this comes before the first import of NumPy.
+    """
+    for variable in _THREAD_VARIABLES:
+        os.environ.setdefault(variable, "1")
+
+
+def launched_size(environment: Mapping[str, str] = os.environ) -> int:
+    """Number of processes the launcher says it started; 1 without a launcher."""
+    return _first_integer(environment, _SIZE_VARIABLES, 1)
+
+
+def launched_rank(environment: Mapping[str, str] = os.environ) -> int:
+    """Rank the launcher gave this process; 0 without a launcher."""
+    return _first_integer(environment, _RANK_VARIABLES, 0)
+
+
+def _first_integer(environment: Mapping[str, str], variables: tuple[str, ...], default: int) -> int:
+    for variable in variables:
+        if variable in environment:
+            return int(environment[variable])
+    return default
+
+
+def world() -> Intracomm:
+    """The communicator of all launched processes, checked.
+
+    Raises
+    ------
+    BadInput
+        If no MPI library can be loaded, if the launcher belongs to another MPI than the library (each
+        process would then silently be a world of its own), or if threads may not call MPI concurrently.
+    """
+    launched = launched_size()
+    if launched > 1:
+        _end_with_parent()
+    try:
+        from mpi4py import MPI
+    except (ImportError, RuntimeError) as error:
+        raise BadInput(f"no MPI library can be loaded (the extra 'mpich' brings one): {error}") from error
+    if launched > 1 and MPI.COMM_WORLD.Get_size() == 1:
+        raise BadInput(
+            f"launcher: it started {launched} processes, but the MPI library sees only 1; "
+            f"launch with the mpirun that belongs to {MPI.Get_library_version().splitlines()[0].strip()}"
+        )
+    if MPI.Query_thread() < MPI.THREAD_MULTIPLE:
+        raise BadInput("MPI library: it must provide MPI_THREAD_MULTIPLE, and this one does not")
+    return MPI.COMM_WORLD
+
+
+def on_root(communicator: Intracomm, function: Callable[[], T]) -> T:
+    """Call ``function`` on rank 0 and return its result, or raise its `BadInput`, on every rank.
+
+    Collective.  The result is pickled.
+    """
+    result: T | BadInput | None = None
+    if communicator.Get_rank() == 0:
+        try:
+            result = function()
+        except BadInput as error:
+            result = error
+    result = communicator.bcast(result)
+    if isinstance(result, BadInput):
+        raise result
+    return result
+
+
+@contextmanager
+def only_first_rank_speaks() -> Iterator[None]:
+    """Within the block, drop what this process prints if its launcher gave it another rank than 0."""
+    with ExitStack() as stack:
+        if launched_rank() != 0:
+            nowhere = stack.enter_context(open(os.devnull, "w"))
+            stack.enter_context(redirect_stdout(nowhere))
+            stack.enter_context(redirect_stderr(nowhere))
+        yield
+
+
+@contextmanager
+def abort_guard(communicator: Intracomm) -> Iterator[None]:
+    """End the whole job, with status 1, when an exception leaves the block on this rank.
+
+    Without it the other ranks would wait for this one for ever.  `BadInput` passes: it comes from
+    `on_root` and leaves the block on every rank.
+    """
+    try:
+        yield
+    except (BadInput, SystemExit):
+        raise
+    except BaseException:
+        # The stream of the process: the command line silences sys.stderr on every rank but the first.
+        print(traceback.format_exc(), file=sys.__stderr__, flush=True)
+        # The launcher stops forwarding output as soon as it hears of the end.
+        time.sleep(_FORWARD_SECONDS)
+        communicator.Abort(1)
+
+
+def _end_with_parent() -> None:
+    """Let this process end when the process that started it does.
+
+    An MPI launcher that is killed takes its ranks along, but its helper on each node does not: ranks that
+    lost it would simulate on, unrecorded.  A new parent is the sign.
+    """
+    parent = os.getppid()
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(_PARENT_CHECK_SECONDS)
+        os._exit(1)
+
+    threading.Thread(target=watch, name="parent-watch", daemon=True).start()

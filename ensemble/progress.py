@@ -1,0 +1,85 @@
+"""Shows people, on standard error, where a study or a simulation stands.
+
+On a terminal it is a table or a bar that changes in place, elsewhere (a log file, a batch job) plain lines.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from datetime import timedelta
+from typing import TYPE_CHECKING
+
+from rich.console import Console, Group
+from rich.live import Live
+from rich.progress import Progress
+from rich.table import Table
+from rich.text import Text
+
+from ensemble.tables import boundary_cells, boundary_columns, bracket_text
+
+if TYPE_CHECKING:
+    from ensemble.scheduler import Snapshot
+
+
+@contextmanager
+def study_progress(console: Console) -> Iterator[Callable[[Snapshot], None]]:
+    """Give a function that shows the latest snapshot of a study."""
+    if console.is_terminal:
+        with Live(console=console) as live:
+            yield lambda snapshot: live.update(Group(_table(snapshot), _summary(snapshot)))
+    else:
+        yield _Lines(console).show
+
+
+@contextmanager
+def run_progress(console: Console) -> Iterator[Callable[[float, float], None]]:
+    """Give a function that shows the time that a simulation has reached, and its latest end."""
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
+        bar = progress.add_task("simulating")
+        yield lambda time, end: progress.update(bar, completed=time, total=end)
+
+
+def _table(snapshot: Snapshot) -> Table:
+    points = snapshot.boundary.points
+    table = Table(*boundary_columns(points), "running")
+    for point in points:
+        (at,) = point.parameters.values()
+        values = sorted(task.value for task in snapshot.running.values() if task.sweep_value == at)
+        table.add_row(*boundary_cells(point), ", ".join(f"{value:.6g}" for value in values))
+    return table
+
+
+def _summary(snapshot: Snapshot) -> Text:
+    known = f" and {snapshot.known} from the store" if snapshot.known else ""
+    return Text(
+        f"{snapshot.runs} runs{known}, {len(snapshot.running)} running, "
+        f"{_duration(snapshot.elapsed)} elapsed, {_time_left(snapshot)}"
+    )
+
+
+def _time_left(snapshot: Snapshot) -> str:
+    if snapshot.seconds_left is None:
+        return "time left unknown"
+    return f"about {_duration(snapshot.seconds_left)} left"
+
+
+def _duration(seconds: float) -> str:
+    return str(timedelta(seconds=round(seconds)))
+
+
+class _Lines:
+    """One line for each change of a bracket or a status, with the state of the whole."""
+
+    def __init__(self, console: Console) -> None:
+        self._console = console
+        self._shown: dict[float, str] = {}
+
+    def show(self, snapshot: Snapshot) -> None:
+        """Print what has changed since the last snapshot."""
+        for point in snapshot.boundary.points:
+            ((name, at),) = point.parameters.items()
+            line = f"{name} {at:g}: {bracket_text(point)} {point.status}"
+            if point.runs and line != self._shown.get(at):
+                self._shown[at] = line
+                self._console.print(f"{line} ({_summary(snapshot)})", soft_wrap=True, highlight=False)

@@ -1,0 +1,118 @@
+"""Running the command line as users do: as processes of its own, under a launcher or without."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ENSEMBLE = (sys.executable, "-m", "ensemble.cli")
+SECONDS = 240
+
+# Two points of the preset's boundary at a coarse resolution: eight or so runs of about a second.
+QUICK_STUDY = (
+    "--set=sweep.values=[0.5, 1.0]",
+    "--set=scene.numerics.points=32",
+    "--set=scene.numerics.tolerance=1e-3",
+    "--tolerance=0.3",
+)
+
+
+@dataclass(frozen=True)
+class Launcher:
+    """Starts Python processes, under `mpirun` where ranks are asked for."""
+
+    mpirun: str
+
+    def command(self, ranks: int, arguments: Sequence[str]) -> list[str]:
+        return [self.mpirun, "-n", str(ranks), *arguments]
+
+    @property
+    def environment(self) -> dict[str, str]:
+        # The launcher finds its helpers by PATH.
+        path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+        return os.environ | {"PATH": path}
+
+    def start(self, ranks: int, arguments: Sequence[str], **options: Any) -> subprocess.Popen[str]:
+        return subprocess.Popen(
+            self.command(ranks, arguments),
+            env=self.environment,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            **options,
+        )
+
+    def run(self, ranks: int, arguments: Sequence[str]) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            self.command(ranks, arguments),
+            env=self.environment,
+            capture_output=True,
+            text=True,
+            timeout=SECONDS,
+            check=False,
+        )
+
+
+@pytest.fixture(scope="session")
+def launcher() -> Launcher:
+    """The launcher that belongs to the environment's MPI library."""
+    beside = Path(sys.executable).with_name("mpirun")
+    mpirun = str(beside) if beside.exists() else shutil.which("mpirun")
+    if mpirun is None:
+        pytest.skip("no mpirun: install the extra mpich")
+    return Launcher(mpirun)
+
+
+@pytest.fixture(scope="session")
+def ensemble() -> Callable[..., subprocess.CompletedProcess[str]]:
+    """Run a command in one process, without a launcher."""
+
+    def run(
+        *arguments: str, cwd: Path | None = None, environment: Mapping[str, str] = {}
+    ) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [*ENSEMBLE, *arguments],
+            env=os.environ | environment,
+            cwd=cwd,
+            capture_output=True,
+            text=True,
+            timeout=SECONDS,
+            check=False,
+        )
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def bisect_command() -> Callable[[Path], list[str]]:
+    """The arguments that trace the quick study into a store."""
+    return lambda store: [*ENSEMBLE, "bisect", *QUICK_STUDY, "--store", str(store), "--json"]
+
+
+@dataclass(frozen=True)
+class Finished:
+    """The quick study, traced without interruption on two ranks."""
+
+    store: Path
+    document: dict[str, Any]
+    progress: str
+
+
+@pytest.fixture(scope="session")
+def finished_study(
+    launcher: Launcher, bisect_command: Callable[[Path], list[str]], tmp_path_factory: pytest.TempPathFactory
+) -> Finished:
+    """The quick study in a store; tests may read it and ask for it again."""
+    store = tmp_path_factory.mktemp("finished") / "store"
+    result = launcher.run(2, bisect_command(store))
+    assert result.returncode == 0, result.stderr
+    return Finished(store, json.loads(result.stdout), result.stderr)
