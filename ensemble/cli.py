@@ -151,7 +151,8 @@ def run(
     from ensemble.record import RunSummary
     from ensemble.study import load_scene
     from ensemble.tables import run_table
-    from solver import Outcome, simulate
+    from solver.run import Outcome
+    from solver.simulate import simulate
 
     with ExitStack() as stack:
         with _refusing():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from functools import cache
 from importlib.metadata import version
 
 from solver.scene import Scene
@@ -25,6 +26,12 @@ def run_key(scene: Scene) -> str:
     """
     # Adding 0.0 turns -0.0 into 0.0: the two compare equal, so equal scenes must not differ by it.
     canonical = json.loads(scene.model_dump_json(), parse_float=lambda digits: float(digits) + 0.0)
-    identity = {"scene": canonical, "solver": version(DISTRIBUTION)}
+    identity = {"scene": canonical, "solver": _solver_version()}
     text = json.dumps(identity, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+
+@cache
+def _solver_version() -> str:
+    # Reading the metadata takes longer than hashing a scene.
+    return version(DISTRIBUTION)
