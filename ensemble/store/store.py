@@ -239,19 +239,17 @@ class Store:
     def check(self) -> list[str]:
         """Verify every run and boundary.
 
+        What a dead process left behind without committing it was never part of the store, so it is no problem;
+        the next `open` sweeps it.
+
         Returns
         -------
         list of str
-            Problems, one sentence each; empty if the store is whole and holds no leftovers.
+            Problems, one sentence each; empty if the store is whole.
         """
         try:
             summaries = self.summaries()
             self.boundaries()
         except (DatabaseError, ValidationError) as error:
             return [f"the catalog cannot be read ({error})"]
-        problems = [
-            problem for summary in summaries for problem in check_run(self._runs / summary.key, summary)
-        ]
-        with locked(self._lock):
-            problems += [f"{leftover.relative_to(self.path)} is a leftover" for leftover in self._leftovers()]
-        return problems
+        return [problem for summary in summaries for problem in check_run(self._runs / summary.key, summary)]
