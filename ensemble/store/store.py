@@ -239,8 +239,8 @@ class Store:
     def check(self) -> list[str]:
         """Verify every run and boundary.
 
-        What a dead process left behind without committing it was never part of the store, so it is no problem;
-        the next `open` sweeps it.
+        What a dead process left behind without committing it was never part of the store, so it is no
+        problem; the next `open` sweeps it.
 
         Returns
         -------
