@@ -7,14 +7,15 @@ has the opposite sign.)
 
 from __future__ import annotations
 
-from itertools import combinations, permutations
+from itertools import combinations
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver import scene
 from solver.geometry import Geometry
-from solver.kernels import adhesion_energy, adhesion_force, adhesion_hessian
+from solver.kernels import adhesion_density, adhesion_energy, adhesion_hessians
 from solver.proximity import Closeness
 from solver.quadrature import required_ratio
 from solver.spectral import interpolation
@@ -41,49 +42,29 @@ class Adhesion:
 
     def density(self, geometry: Geometry, closeness: Closeness) -> Array:
         """Force per length, (2, M, N)."""
-        points, spacing = geometry.points, geometry.membranes.spacing
-        strength = self._hamaker * self._potential[1]
-        density = np.zeros_like(points)
-        force = np.empty((2, geometry.membranes.points))
-        for target, source in permutations(range(len(spacing)), 2):
-            targets, sources = points[:, target], points[:, source]
-            adhesion_force(targets, sources, *self._potential, strength * spacing[source], force)
-            for near in closeness.refinements(target, source, self._ratio):
-                refined = np.empty_like(near.targets)
-                scale = strength * spacing[source] / near.factor
-                adhesion_force(near.targets, near.sources, *self._potential, scale, refined)
-                force[:, near.rows] = refined
-            density[:, target] += force
+        density = np.zeros_like(geometry.points)
+        adhesion_density(*self._arguments(geometry, closeness), density)
         return density
 
     def jacobian(self, geometry: Geometry, closeness: Closeness, dx: Array, dy: Array) -> tuple[Array, Array]:
         """Derivatives of both components by the state, (M·N, state) each, given those of the points."""
-        membranes = geometry.membranes
-        points = membranes.points
-        size = membranes.count * points
-        hessian = np.zeros((3, size, size))
-        for target, source in permutations(range(membranes.count), 2):
-            rows = slice(target * points, (target + 1) * points)
-            columns = slice(source * points, (source + 1) * points)
-            pair = self._hessian(
-                geometry.points[:, target], geometry.points[:, source], membranes.spacing[source]
-            )
-            own = pair.sum(axis=-1)
-            for near in closeness.refinements(target, source, self._ratio):
-                fine = self._hessian(near.targets, near.sources, membranes.spacing[source] / near.factor)
-                own[:, near.rows] = fine.sum(axis=-1)
-                pair[:, near.rows] = fine @ near.interpolation
-            np.negative(pair, out=hessian[:, rows, columns])
-            diagonal = np.arange(rows.start, rows.stop)
-            hessian[:, diagonal, diagonal] += own
+        size = geometry.membranes.count * geometry.membranes.points
+        hessian = np.empty((3, size, size))
+        adhesion_hessians(*self._arguments(geometry, closeness), hessian)
         xx, xy, yy = hessian
         return xx @ dx + xy @ dy, xy @ dx + yy @ dy
 
-    def _hessian(self, targets: Array, sources: Array, spacing: float) -> Array:
-        components = np.empty((3, targets.shape[1], sources.shape[1]))
-        scale = self._hamaker * self._potential[1] * spacing
-        adhesion_hessian(targets, sources, *self._potential, scale, *components)
-        return components
+    def _arguments(self, geometry: Geometry, closeness: Closeness) -> tuple[Any, ...]:
+        """What the compiled sums over all pairs are given."""
+        return (
+            geometry.points,
+            geometry.membranes.spacing,
+            closeness.distances,
+            self._ratio,
+            closeness.interpolations(self._ratio),
+            *self._potential,
+            self._hamaker * self._potential[1],
+        )
 
     def energy(self, geometry: Geometry, refinement: int = 2) -> float:
         """∫∫ φ ds ds summed over all pairs, on points interpolated ``refinement`` times."""

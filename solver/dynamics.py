@@ -19,6 +19,7 @@ from solver.adhesion import Adhesion
 from solver.bending import Bending
 from solver.flow import ImposedFlow, imposed_flow
 from solver.geometry import Geometry, Membranes
+from solver.gliding import glide, gliding_direction, gliding_speed
 from solver.proximity import Closeness
 from solver.scene import Scene
 from solver.spectral import differentiation, highest_modes, integration
@@ -100,10 +101,7 @@ class Dynamics:
         """
         motion = self.motion(state)
         turning = self._turning(motion)
-        curvature = motion.geometry.curvature
-        turning += gliding_speed(curvature, turning) * curvature
-        highest = highest_modes(self.membranes.points)
-        turning -= (turning @ highest) @ highest.T
+        glide(motion.geometry.curvature, turning, highest_modes(self.membranes.points))
         return np.concatenate([turning.ravel(), motion.velocity.sum(axis=2).ravel() / self.membranes.points])
 
     @staticmethod
@@ -183,34 +181,16 @@ class Dynamics:
         count, points = self.membranes.count, self.membranes.points
         result = np.empty((self.membranes.state_size, ux.shape[1]))
         matrix, highest = differentiation(points), highest_modes(points)
+        direction = gliding_direction(geometry.curvature)
         for vesicle in range(count):
             block = slice(vesicle * points, (vesicle + 1) * points)
             wavenumber = 2 * np.pi / self.membranes.length[vesicle]
             tx, ty = geometry.tangents[:, vesicle, :, None] * wavenumber
             result[block] = tx * (matrix @ uy[block]) - ty * (matrix @ ux[block])
             curvature = geometry.curvature[vesicle]
-            direction = _gliding_direction(curvature)
-            result[block] += np.outer(curvature, direction @ result[block])
+            result[block] += np.outer(curvature, direction[vesicle] @ result[block])
             result[block, block] += gliding[vesicle] * wavenumber * matrix
             result[block] -= highest @ (highest.T @ result[block])
             result[count * points + vesicle] = ux[block].mean(axis=0)
             result[count * points + count + vesicle] = uy[block].mean(axis=0)
         return result
-
-
-def gliding_speed(curvature: Array, turning: Array) -> Array:
-    """Speed at which the points glide along each membrane so that their tangent angles change least, (M, 1).
-
-    With a speed c added along the tangent, θ_t = n · u_s + c θ_s.  Least squares over the part of θ_t that
-    varies along the membrane: c = −⟨w̃, κ̃⟩/⟨κ̃, κ̃⟩, w̃ and κ̃ being n · u_s and the curvature, each without its
-    mean.
-    """
-    return np.sum(_gliding_direction(curvature) * turning, axis=-1, keepdims=True)
-
-
-def _gliding_direction(curvature: Array) -> Array:
-    """The linear functional of n · u_s that `gliding_speed` is, (..., N)."""
-    variation = curvature - curvature.mean(axis=-1, keepdims=True)
-    size = np.sum(variation**2, axis=-1, keepdims=True)
-    # On a circle gliding changes nothing, and the quotient of two round-off errors must not drive it.
-    return -variation / (size + 1e-12 * np.sum(curvature**2, axis=-1, keepdims=True))

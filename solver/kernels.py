@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
+MAXIMUM_FACTOR = 32  # of refinement; beyond it a close point is not resolved
+
 # Without "ninf" and "nnan": a run that diverges must show it.
 compiled = partial(
     njit, cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz", "arcp"}
@@ -125,44 +127,59 @@ def complete_self_part(
 
 
 @compiled
-def refine_stokeslets(
-    targets: Array,
-    sources: Array,
-    interpolation: Array,
-    rows: Indices,
-    first_row: int,
-    first_column: int,
-    xx: Array,
-    xy: Array,
-    yy: Array,
+def refinement_factors(distance_per_spacing: Array, ratio: float) -> Indices:
+    """Least powers of two, at most 32, that times the distance/spacing (n,) of each point reach ``ratio``."""
+    factors = np.ones(distance_per_spacing.size, dtype=np.int64)
+    for i in range(factors.size):
+        while factors[i] < MAXIMUM_FACTOR and factors[i] * distance_per_spacing[i] < ratio:
+            factors[i] *= 2
+    return factors
+
+
+@compiled
+def refine_single_layer(
+    points: Array, distances: Array, ratio: float, interpolations: Array, xx: Array, xy: Array, yy: Array
 ) -> None:
-    """Replace rows of one vesicle's block by those of the refined source, folded back onto its own points.
+    """Replace the rows of targets that are close to another vesicle.
+
+    Its points are refined for them, and the refined columns are folded back onto its own points.
 
     Parameters
     ----------
-    targets : (2, r)
-        The points of ``rows``.
-    sources : (2, factor·n)
-    interpolation : (factor·n, n)
-    rows : (r,)
-        Within the target vesicle, whose rows begin at ``first_row``; the source's columns begin at
-        ``first_column``.
+    points : (2, M, n)
+    distances : (M, M, n)
+        Distance over spacing, by target, source and point of the target.
+    ratio : float
+        What is to be reached, by `refinement_factors`.
+    interpolations : (rows, n)
+        `spectral.interpolations` for all factors that occur.
     xx, xy, yy : (M·n, M·n), written
     """
-    fine = (targets.shape[1], sources.shape[1])
-    fine_xx, fine_xy, fine_yy = np.empty(fine), np.empty(fine), np.empty(fine)
-    stokeslets(targets, sources, fine_xx, fine_xy, fine_yy)
-    points = interpolation.shape[1]
-    weight = points / sources.shape[1]
-    last_column = first_column + points
-    folded_xx = np.dot(fine_xx, interpolation)
-    folded_xy = np.dot(fine_xy, interpolation)
-    folded_yy = np.dot(fine_yy, interpolation)
-    for k in range(rows.size):
-        row = first_row + rows[k]
-        xx[row, first_column:last_column] = weight * folded_xx[k]
-        xy[row, first_column:last_column] = weight * folded_xy[k]
-        yy[row, first_column:last_column] = weight * folded_yy[k]
+    count, n = points.shape[1], points.shape[2]
+    for target in range(count):
+        for source in range(count):
+            if target == source:
+                continue
+            factors = refinement_factors(distances[target, source], ratio)
+            factor = 2
+            while factor <= factors.max():
+                rows = np.flatnonzero(factors == factor)
+                if rows.size > 0:
+                    interpolation = interpolations[(factor - 2) * n : (2 * factor - 2) * n]
+                    fine = np.dot(np.ascontiguousarray(points[:, source]), interpolation.T)
+                    shape = (rows.size, fine.shape[1])
+                    fine_xx, fine_xy, fine_yy = np.empty(shape), np.empty(shape), np.empty(shape)
+                    stokeslets(points[:, target][:, rows], fine, fine_xx, fine_xy, fine_yy)
+                    folded_xx = np.dot(fine_xx, interpolation)
+                    folded_xy = np.dot(fine_xy, interpolation)
+                    folded_yy = np.dot(fine_yy, interpolation)
+                    first, last = source * n, (source + 1) * n
+                    for k in range(rows.size):
+                        row = target * n + rows[k]
+                        xx[row, first:last] = folded_xx[k] / factor
+                        xy[row, first:last] = folded_xy[k] / factor
+                        yy[row, first:last] = folded_yy[k] / factor
+                factor *= 2
 
 
 @compiled
@@ -255,6 +272,43 @@ def adhesion_force(
 
 
 @compiled
+def adhesion_density(
+    points: Array,
+    spacing: Array,
+    distances: Array,
+    ratio: float,
+    interpolations: Array,
+    distance: float,
+    m: int,
+    n: int,
+    strength: float,
+    density: Array,
+) -> None:
+    """Add the adhesion force per length to ``density`` (2, M, N); arguments as in `refine_single_layer`."""
+    count, size = points.shape[1], points.shape[2]
+    for target in range(count):
+        for source in range(count):
+            if target == source:
+                continue
+            factors = refinement_factors(distances[target, source], ratio)
+            factor = 1
+            while factor <= factors.max():
+                rows = np.flatnonzero(factors == factor)
+                if rows.size > 0:
+                    fine = np.ascontiguousarray(points[:, source])
+                    if factor > 1:
+                        interpolation = interpolations[(factor - 2) * size : (2 * factor - 2) * size]
+                        fine = np.dot(fine, interpolation.T)
+                    force = np.empty((2, rows.size))
+                    scale = strength * spacing[source] / factor
+                    adhesion_force(points[:, target][:, rows], fine, distance, m, n, scale, force)
+                    for k in range(rows.size):
+                        density[0, target, rows[k]] += force[0, k]
+                        density[1, target, rows[k]] += force[1, k]
+                factor *= 2
+
+
+@compiled
 def adhesion_energy(targets: Array, sources: Array, distance: float, m: int, n: int) -> float:
     """Σ Σ (δ/r)^m − (m/n)(δ/r)^n over ``targets`` (2, t) and ``sources`` (2, s)."""
     dx, dy, inverse, high, low = np.empty((5, sources.shape[1]))
@@ -295,3 +349,46 @@ def adhesion_hessian(
             xx[i, j] = strength + radial * dx[j] * dx[j]
             xy[i, j] = radial * dx[j] * dy[j]
             yy[i, j] = strength + radial * dy[j] * dy[j]
+
+
+@compiled
+def adhesion_hessians(
+    points: Array,
+    spacing: Array,
+    distances: Array,
+    ratio: float,
+    interpolations: Array,
+    distance: float,
+    m: int,
+    n: int,
+    strength: float,
+    hessian: Array,
+) -> None:
+    """Fill the components (3, M·N, M·N) of the derivative of `adhesion_density` by the points."""
+    count, size = points.shape[1], points.shape[2]
+    hessian[:] = 0.0
+    for target in range(count):
+        for source in range(count):
+            if target == source:
+                continue
+            factors = refinement_factors(distances[target, source], ratio)
+            factor = 1
+            while factor <= factors.max():
+                rows = np.flatnonzero(factors == factor)
+                if rows.size > 0:
+                    sources = np.ascontiguousarray(points[:, source])
+                    interpolation = interpolations[(factor - 2) * size : (2 * factor - 2) * size]
+                    fine = np.dot(sources, interpolation.T) if factor > 1 else sources
+                    pair = np.empty((3, rows.size, fine.shape[1]))
+                    scale = strength * spacing[source] / factor
+                    adhesion_hessian(
+                        points[:, target][:, rows], fine, distance, m, n, scale, pair[0], pair[1], pair[2]
+                    )
+                    first, last = source * size, (source + 1) * size
+                    for component in range(3):
+                        folded = np.dot(pair[component], interpolation) if factor > 1 else pair[component]
+                        for k in range(rows.size):
+                            row = target * size + rows[k]
+                            hessian[component, row, first:last] = -folded[k]
+                            hessian[component, row, row] += pair[component, k].sum()
+                factor *= 2

@@ -13,15 +13,8 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.special import gammaln, kve
-
-from solver.kernels import compiled
-
-Array = NDArray[np.float64]
-
-MAXIMUM_FACTOR = 32
 
 
 @cache
@@ -36,13 +29,3 @@ def required_ratio(order: float, tolerance: float) -> float:
 
     lowest = max(nu, 0.1)  # below it the alias is not small and the estimate says nothing
     return float(brentq(excess, lowest, 1e3)) / (2 * np.pi)
-
-
-@compiled
-def refinement_factors(distance_per_spacing: Array, ratio: float) -> NDArray[np.int64]:
-    """Powers of two, at most 32, that refine the sources so far that distance/spacing reaches ``ratio``."""
-    factors = np.ones(distance_per_spacing.size, dtype=np.int64)
-    for i in range(factors.size):
-        while factors[i] < MAXIMUM_FACTOR and factors[i] * distance_per_spacing[i] < ratio:
-            factors[i] *= 2
-    return factors

@@ -66,6 +66,13 @@ def interpolation(points: int, factor: int) -> Array:
 
 
 @cache
+def interpolations(points: int, largest_factor: int) -> Array:
+    """The matrices of `interpolation` for the factors 2, 4, … up to the largest, one below the other."""
+    factors = [2**power for power in range(1, largest_factor.bit_length())]
+    return _frozen(np.concatenate([np.empty((0, points)), *(interpolation(points, f) for f in factors)]))
+
+
+@cache
 def logarithm_weights(points: int) -> Array:
     """Circulant quadrature matrix W of the logarithm: Σ_j W_ij f_j = −½∫ log(4 sin²((α_i−β)/2)) f(β) dβ.
 

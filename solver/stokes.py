@@ -8,8 +8,6 @@ vesicle the trapezoid rule is used, on refined sources where the target is close
 
 from __future__ import annotations
 
-from itertools import permutations
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -67,19 +65,14 @@ class SingleLayer:
                 vesicle * points,
                 *components,
             )
-        if closeness is None:
-            return
-        for target, source in permutations(range(count), 2):
-            for near in closeness.refinements(target, source, self._ratio):
-                kernels.refine_stokeslets(
-                    near.targets,
-                    near.sources,
-                    near.interpolation,
-                    near.rows,
-                    target * points,
-                    source * points,
-                    *components,
-                )
+        if closeness is not None:
+            kernels.refine_single_layer(
+                geometry.points,
+                closeness.distances,
+                self._ratio,
+                closeness.interpolations(self._ratio),
+                *components,
+            )
 
     def velocity(self, point_forces: Array) -> Array:
         """Velocity (2, M, N) that point forces (2, M, N) cause at the membranes' points."""
