@@ -27,14 +27,15 @@ def areas(motion: Motion) -> Array:
     return np.asarray(0.5 * geometry.membranes.length * moment)
 
 
-def steady_speed(motion: Motion) -> float:
-    """Largest normal speed of any membrane point in the frame that moves with the vesicles' mean.
+def state_rate(dynamics: Dynamics, motion: Motion) -> float:
+    """Largest rate of change of any tangent angle, or of any center relative to their mean.
 
-    Zero exactly when all shapes and the arrangement stay; a membrane that only treads is steady.
+    Zero exactly when shapes and arrangement stay: the points glide (`gliding`), so treading does not count.
     """
-    mean = motion.velocity.mean(axis=(1, 2))
-    relative = motion.velocity - mean[:, None, None]
-    return float(np.max(np.abs(np.sum(relative * motion.geometry.normals, axis=0))))
+    rate = dynamics.rate_of(motion)
+    turning = dynamics.membranes.tangent_angle(rate)
+    moving = dynamics.membranes.center(rate)
+    return float(max(np.abs(turning).max(), np.abs(moving - moving.mean(axis=0)).max()))
 
 
 def measures(setting: scene.Scene, dynamics: Dynamics) -> dict[str, Measure]:
@@ -45,7 +46,7 @@ def measures(setting: scene.Scene, dynamics: Dynamics) -> dict[str, Measure]:
         "bending_energy": lambda motion: dynamics.bending.energy(motion.geometry),
         "area_error": lambda motion: float(np.max(np.abs(areas(motion) / target_area - 1))),
         "closure_error": lambda motion: float(np.max(np.hypot(*motion.geometry.tangents.mean(axis=2)))),
-        "steady_speed": steady_speed,
+        "state_rate": lambda motion: state_rate(dynamics, motion),
     }
     adhesion = dynamics.adhesion
     if adhesion:

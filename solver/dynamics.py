@@ -99,7 +99,10 @@ class Dynamics:
         The two highest modes of the tangent angle stay as they are: their tangents alias onto a mode whose
         derivative vanishes, so that bending does not damp them and gliding would slowly fill them.
         """
-        motion = self.motion(state)
+        return self.rate_of(self.motion(state))
+
+    def rate_of(self, motion: Motion) -> Array:
+        """`rate` in the state of a motion."""
         turning = self._turning(motion)
         glide(motion.geometry.curvature, turning, highest_modes(self.membranes.points))
         return np.concatenate([turning.ravel(), motion.velocity.sum(axis=2).ravel() / self.membranes.points])
@@ -116,13 +119,14 @@ class Dynamics:
         """Derivative of `rate` with the kernel of the single-layer potential held fixed.
 
         Shape (state_size, state_size).  Dropped are the derivatives of S and of the gliding direction; kept
-        are those of all forces, the tension's direction, the constraint and the flow.
+        are those of all forces, the tension's direction, the constraint and the flow.  S is applied to the
+        forces without each vesicle's mean pressure, which moves nothing: so what is dropped is least.
         """
         motion = self.motion(state)
         geometry = motion.geometry
         dx, dy = self._point_derivatives(geometry)
         force_x, force_y = self.bending.jacobian(geometry)
-        self._add_tension_turning(motion, force_x, force_y)
+        self._add_turning(motion, force_x, force_y)
         if self.adhesion:
             adhesion_x, adhesion_y = self.adhesion.jacobian(geometry, Closeness(geometry), dx, dy)
             force_x += adhesion_x
@@ -145,16 +149,22 @@ class Dynamics:
         uy += tension_y @ tension
         return self._rate_columns(geometry, ux, uy, gliding_speed(geometry.curvature, turning))
 
-    def _add_tension_turning(self, motion: Motion, force_x: Array, force_y: Array) -> None:
-        """Add the change of the tension's force with its direction, ∂/∂s (σ n δθ)."""
+    def _add_turning(self, motion: Motion, force_x: Array, force_y: Array) -> None:
+        """Add what turning a membrane does to its tension, ∂/∂s (σ n δθ), and to its pressure, p t δθ."""
         points = self.membranes.points
         matrix = differentiation(points)
+        geometry = motion.geometry
+        tension_force = geometry.arclength_derivative(motion.tension * geometry.tangents)
+        pressure = np.mean(np.sum((motion.bending + tension_force) * geometry.normals, axis=0), axis=1)
         for vesicle in range(self.membranes.count):
             block = slice(vesicle * points, (vesicle + 1) * points)
             scaled = motion.tension[vesicle] * (2 * np.pi / self.membranes.length[vesicle])
-            tx, ty = motion.geometry.tangents[:, vesicle]
+            tx, ty = geometry.tangents[:, vesicle]
             force_x[block, block] -= matrix * (scaled * ty)
             force_y[block, block] += matrix * (scaled * tx)
+            every_point = np.arange(block.start, block.stop)
+            force_x[every_point, every_point] += pressure[vesicle] * tx
+            force_y[every_point, every_point] += pressure[vesicle] * ty
 
     def _assemble(self, state: Array) -> tuple[Geometry, Closeness | None]:
         geometry = Geometry(self.membranes, state)

@@ -46,6 +46,11 @@ class Membranes:
         """Arclength between neighboring points, (M,)."""
         return self.length / self.points
 
+    @cached_property
+    def natural_rate(self) -> float:
+        """Slowest rate at which bending acts on a vesicle's own scale, modulus/(length/2π)³ (viscosity 1)."""
+        return float(np.min(self.bending_modulus * (2 * np.pi / self.length) ** 3))
+
     @property
     def state_size(self) -> int:
         """Length of the state vector: per vesicle N tangent angles and 2 coordinates of the center."""

@@ -5,9 +5,10 @@ along the tangent, θ_t = n · u_s + c θ_s, and a membrane that treads around a
 state, through which an integrator takes large steps.  The speed is a least-squares choice over the part of
 θ_t that varies along the membrane (a rigid turn has none, and is left alone):
 
-    c = −⟨w̃, κ̃⟩/⟨κ̃, κ̃⟩,
+    c = −(⟨w̃, κ̃⟩ + ε w̄ κ̄) / (⟨κ̃, κ̃⟩ + ε κ̄²),
 
-w̃ and κ̃ being n · u_s and the curvature, each without its mean.
+w̄ and w̃ being the mean of n · u_s and the rest, κ̄ and κ̃ those of the curvature.  A circle has no κ̃: there the
+tiny ε lets the points stay while it turns.
 """
 
 from __future__ import annotations
@@ -19,16 +20,17 @@ from solver.kernels import compiled
 
 Array = NDArray[np.float64]
 
+_CIRCLE_WEIGHT = 1e-12
+
 
 @compiled
 def gliding_direction(curvature: Array) -> Array:
     """The linear functional of n · u_s that is the gliding speed, (M, N), for curvatures (M, N)."""
     direction = np.empty_like(curvature)
     for vesicle in range(curvature.shape[0]):
-        variation = curvature[vesicle] - curvature[vesicle].mean()
-        # On a circle gliding changes nothing, and the quotient of two round-off errors must not drive it.
-        smallest = 1e-12 * np.sum(curvature[vesicle] ** 2)
-        direction[vesicle] = -variation / (np.sum(variation**2) + smallest)
+        mean = curvature[vesicle].mean()
+        weighted = curvature[vesicle] - mean + _CIRCLE_WEIGHT * mean
+        direction[vesicle] = -weighted / np.sum(weighted * curvature[vesicle])
     return direction
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
@@ -19,28 +21,35 @@ class Orbit:
     ----------
     angle, distance : float
         At the end of the last step; the angle (radians) is unwrapped.
-    outward : bool
-        Whether the distance grew during the last step.
+    separated : bool
+        Whether the distance has passed the separated distance, growing.
     half_turns : list of float
         ``half_turns[k]`` is when the line had first turned by kπ from its start, either way.
     """
 
-    def __init__(self, membranes: Membranes, state: Array) -> None:
+    def __init__(self, membranes: Membranes, state: Array, separated_distance: float) -> None:
         self._membranes = membranes
+        self._separated_distance = separated_distance
         offset = self._offset(state)
         self.angle = self._start = float(np.arctan2(offset[1], offset[0]))
         self.distance = float(np.hypot(*offset))
-        self.outward = False
+        self.separated = False
         self.half_turns = [0.0]
 
-    def advance(self, step: Step) -> None:
-        """Follow one step."""
+    def advance(self, step: Step) -> Step:
+        """Follow one step, but no farther than to separation; return the part followed."""
+        if self.distance_of(step.state) >= max(self._separated_distance, self.distance):
+            self.separated = True
+            if self.distance < self._separated_distance:
+                step = step.until(
+                    self._crossing(step, lambda state: self.distance_of(state) - self._separated_distance)
+                )
         distance = self.distance_of(step.state)
         angle = self.angle_of(step.state)
         while abs(angle - self._start) >= len(self.half_turns) * np.pi:
-            self.half_turns.append(self._crossing(step, len(self.half_turns) * np.pi))
-        self.outward = distance > self.distance
+            self.half_turns.append(self._crossing(step, self._excess_turn))
         self.distance, self.angle = distance, angle
+        return step
 
     def distance_of(self, state: Array) -> float:
         """Center distance in a state."""
@@ -61,10 +70,17 @@ class Orbit:
         first, second = self._membranes.center(state)
         return np.asarray(second - first)
 
-    def _crossing(self, step: Step, turn: float) -> float:
-        def excess(time: float) -> float:
-            return abs(self.angle_of(step.interpolate(time)) - self._start) - turn
+    def _excess_turn(self, state: Array) -> float:
+        """How far the line has turned beyond the next half turn."""
+        return abs(self.angle_of(state) - self._start) - len(self.half_turns) * np.pi
 
-        if excess(step.start) >= 0:  # the interpolant may differ from the previous one by the tolerance
+    @staticmethod
+    def _crossing(step: Step, excess: Callable[[Array], float]) -> float:
+        """When within a step the excess of a state becomes positive."""
+
+        def excess_at(time: float) -> float:
+            return excess(step.interpolate(time))
+
+        if excess_at(step.start) >= 0:  # the interpolant may differ from the previous one by the tolerance
             return step.start
-        return float(brentq(excess, step.start, step.end, xtol=1e-12 * max(step.end, 1.0)))
+        return float(brentq(excess_at, step.start, step.end, xtol=1e-12 * max(step.end, 1.0)))

@@ -37,16 +37,12 @@ class Criterion(Protocol):
 
 
 class Separated:
-    """The centers pass a stated distance, moving apart."""
-
-    def __init__(self, criteria: Criteria) -> None:
-        self._distance = criteria.separated_distance
+    """The centers have passed a stated distance, moving apart."""
 
     def decide(self, history: History) -> Outcome | None:
         """See `Criterion`."""
-        orbit = history.orbit
-        assert orbit
-        return Outcome.SEPARATED if orbit.outward and orbit.distance >= self._distance else None
+        assert history.orbit
+        return Outcome.SEPARATED if history.orbit.separated else None
 
 
 class Revolved:
@@ -89,12 +85,12 @@ class Steady:
 
     def decide(self, history: History) -> Outcome | None:
         """See `Criterion`."""
-        time, speed = history.samples["time"], history.samples["steady_speed"]
+        time, rate = history.samples["time"], history.samples["state_rate"]
         since = time[-1] - self._criteria.steady_time
         if time[0] > since:
             return None
-        for instant, value in zip(reversed(time), reversed(speed), strict=True):
-            if value > self._criteria.steady_speed:
+        for instant, value in zip(reversed(time), reversed(rate), strict=True):
+            if value > self._criteria.steady_rate:
                 return None
             if instant <= since:
                 break
@@ -117,7 +113,7 @@ class Steady:
 def criteria_of(scene: Scene) -> tuple[Criterion, ...]:
     """The criteria that apply to a scene, in the order in which they are asked."""
     pair = len(scene.vesicles) == 2
-    found: list[Criterion] = [Separated(scene.criteria)] if pair else []
+    found: list[Criterion] = [Separated()] if pair else []
     if pair and isinstance(scene.flow, Shear):
         found.append(Revolved(scene.criteria))
     else:

@@ -72,7 +72,7 @@ class Work:
 
 
 # Diagnostics by name, each of shape (time,) and sampled at `Series["time"]`.  Always present: time,
-# bending_energy, area_error, closure_error, steady_speed.  With two or more vesicles: gap.  With exactly two:
+# bending_energy, area_error, closure_error, state_rate.  With two or more vesicles: gap.  With exactly two:
 # center_distance, center_angle (of the line of centers, radians, unwrapped).  With adhesion:
 # adhesion_energy.  In shear: viscosity_bending_tension and, with adhesion, viscosity_adhesion.  With one
 # vesicle: inclination_angle (radians).

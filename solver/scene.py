@@ -98,6 +98,7 @@ class Start(Model):
     """
 
     relaxed: bool = False
+    horizon: Positive = 1000.0  # by which the relaxation must have come to rest
     tilt: float = 1e-3
 
 
@@ -116,7 +117,7 @@ class Criteria(Model):
     separated_distance: Positive = 12.0  # center distance that counts as separated when passed outward
     revolutions: int = Field(1, ge=1)  # of the line of centers that a bound pair has completed
     gap_growth: NonNegative = 0.01  # relative growth of the gap's maximum that still counts as none
-    steady_speed: Positive = 1e-5  # normal speed of every membrane point below which a state is steady
+    steady_rate: Positive = 1e-5  # change of every tangent angle and center below which a state is steady
     steady_time: Positive = 5.0  # for at least this long
     extensions: float = Field(4.0, ge=1)  # an undecided run may go on to this multiple of the horizon
 

@@ -61,23 +61,27 @@ def simulate(
     """
     began = clock.perf_counter()
     dynamics = Dynamics.of(scene)
-    state, evaluations = _initial_state(scene, dynamics, should_stop)
-    orbit = Orbit(dynamics.membranes, state) if len(scene.vesicles) == 2 else None
+    start = _start(scene, dynamics, should_stop)
+    orbit = None
+    if len(scene.vesicles) == 2:
+        orbit = Orbit(dynamics.membranes, start.state, scene.criteria.separated_distance)
     recorder = Recorder(scene, dynamics, orbit)
     criteria = criteria_of(scene)
     latest = latest_time(scene)
-    progress = _Progress(0.0, state)
+    progress = _Progress(0.0, start.state)
     outcome, failure = Outcome.UNDECIDED, None
     integrator = None
     try:
-        recorder.record(0.0, state)
+        recorder.record(0.0, start.state)
+        if start.failure:
+            raise StepFailedError(start.failure)
         integrator = BackwardDifferentiation(
-            dynamics.rate, dynamics.jacobian, state, scene.numerics.tolerance, latest
+            dynamics.rate, dynamics.jacobian, start.state, scene.numerics.tolerance, latest
         )
         while progress.time < latest and outcome is Outcome.UNDECIDED:
             step = integrator.step()
             if orbit:
-                orbit.advance(step)
+                step = orbit.advance(step)
             _record_up_to(step.end, step.interpolate, recorder, scene.output.interval)
             progress.time, progress.state = step.end, step.state
             progress.steps += 1
@@ -98,7 +102,7 @@ def simulate(
     work = Work(
         steps=progress.steps,
         rejected_steps=progress.shortened,
-        rhs_evaluations=evaluations + dynamics.evaluations,
+        rhs_evaluations=start.evaluations + dynamics.evaluations,
         jacobian_evaluations=integrator.jacobian_evaluations if integrator else 0,
         factorizations=integrator.factorizations if integrator else 0,
         wall_seconds=clock.perf_counter() - began,
@@ -106,16 +110,27 @@ def simulate(
     return _summary(scene, outcome, failure, progress, orbit, recorder, work)
 
 
-def _initial_state(
-    scene: Scene, dynamics: Dynamics, should_stop: Callable[[], bool] | None
-) -> tuple[Array, int]:
-    """The state to begin with, and the evaluations that finding it took."""
+@dataclass(frozen=True)
+class _Start:
+    """The state to begin with, what finding it cost, and why it could not be found."""
+
+    state: Array
+    evaluations: int = 0
+    failure: str | None = None
+
+
+def _start(scene: Scene, dynamics: Dynamics, should_stop: Callable[[], bool] | None) -> _Start:
+    placed = placed_state(scene)
     if not scene.start.relaxed:
-        return placed_state(scene), 0
-    at_rest = scene.model_copy(update={"flow": None, "start": Start()})
+        return _Start(placed)
+    at_rest = scene.model_copy(update={"flow": None, "start": Start(), "horizon": scene.start.horizon})
     relaxed = simulate(at_rest, should_stop=should_stop)
+    if relaxed.outcome is not Outcome.EQUILIBRIUM:
+        reason = relaxed.failure or f"{relaxed.outcome} at time {relaxed.time:g}"
+        return _Start(placed, relaxed.work.rhs_evaluations, f"start: the pair did not relax ({reason})")
     last = dynamics.membranes.pack(relaxed.frames.tangent_angle[-1], relaxed.frames.center[-1])
-    return turned_state(dynamics.membranes, last, scene.start.tilt), relaxed.work.rhs_evaluations
+    turned = turned_state(dynamics.membranes, last, scene.start.tilt)
+    return _Start(turned, relaxed.work.rhs_evaluations)
 
 
 def _record_up_to(

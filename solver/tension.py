@@ -24,8 +24,8 @@ from solver.stokes import SingleLayer
 Array = NDArray[np.float64]
 
 # Relative weight of the mean tension that keeps the inverse finite for a circle.  There a constant tension
-# is a pressure and moves nothing, so its value does not matter; for any other shape this is round-off.
-_CIRCLE_SHIFT = 1e-13
+# is a pressure and moves nothing, so its value does not matter; it must only not be divided by round-off.
+_CIRCLE_SHIFT = 1e-10
 
 
 class TensionNotFoundError(ArithmeticError):
@@ -44,6 +44,7 @@ def _conjugate_gradients(
     inverse: Array,
     stretching: Array,
     tolerance: float,
+    natural_rate: float,
     limit: int,
     tension: Array,
     velocity: Array,
@@ -51,12 +52,15 @@ def _conjugate_gradients(
     """Solve for the tension; return the number of iterations, or −1 if ``limit`` was not enough.
 
     ``derivative`` is the transposed differentiation matrix; ``rate`` (M, 1) = 2π/length; ``stretching``
-    (M, N) is Div u₀.  ``velocity`` (2, M, N) is written with that caused by ``tension`` (M, N).
+    (M, N) is Div u₀, and ``natural_rate`` a stretching that counts as large.  ``velocity`` (2, M, N) is
+    written with that caused by ``tension`` (M, N).
     """
     count, points = stretching.shape
     size = count * points
     residual = (stretching * spacing).reshape(size)
-    goal = tolerance * np.sqrt(np.dot(residual, residual))
+    weights = natural_rate * spacing
+    natural = np.sqrt(points * np.sum(weights * weights))
+    goal = tolerance * max(np.sqrt(np.dot(residual, residual)), natural)
     solution = np.zeros(size)
     flow_x, flow_y = np.zeros(size), np.zeros(size)
     direction = np.dot(inverse, residual)
@@ -96,7 +100,8 @@ class Inextensibility:
     Parameters
     ----------
     tolerance : float
-        Stretching left over, relative to that without tension.
+        Stretching left over, relative to that without tension or to `Membranes.natural_rate` if that is
+        larger: in a state of rest there is no other scale.
     """
 
     def __init__(self, tolerance: float) -> None:
@@ -128,6 +133,7 @@ class Inextensibility:
                 self._inverse,
                 stretching,
                 self.tolerance,
+                membranes.natural_rate,
                 limit,
                 tension,
                 velocity,

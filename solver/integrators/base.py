@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, replace
+from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,10 @@ class Step:
     interpolate: Callable[[float], Array]
     local_error: float
     shortened: bool
+
+    def until(self, time: float) -> Self:
+        """The part of the step up to a time in it."""
+        return replace(self, end=time, state=self.interpolate(time))
 
 
 class Integrator(Protocol):

@@ -63,13 +63,13 @@ class BackwardDifferentiation:
         """See `Integrator`."""
         bdf = self._bdf
         start, intended, order = bdf.t, bdf.h_abs, bdf.order
-        predictor = bdf.dense_output() if bdf.t_old is not None else None
+        predictor = self._predictor()
         message = bdf.step()
         if bdf.status == "failed":
             raise StepFailedError(message)
-        change = bdf.y - predictor(bdf.t) if predictor else bdf.y - bdf.dense_output()(start)
         if not np.all(np.isfinite(bdf.y)):
             raise StepFailedError("the state is no longer finite")
+        change = bdf.y - predictor(bdf.t)
         return Step(
             start=start,
             end=bdf.t,
@@ -78,3 +78,11 @@ class BackwardDifferentiation:
             local_error=float(bdf.error_const[order] * np.sqrt(np.mean(change**2))),
             shortened=bool(bdf.t - start < 0.999 * min(intended, bdf.t_bound - start)),
         )
+
+    def _predictor(self) -> Callable[[float], Array]:
+        """The last step's interpolant, from which the formula extrapolates; at first a straight line."""
+        if self._bdf.t_old is not None:
+            predictor: Callable[[float], Array] = self._bdf.dense_output()
+            return predictor
+        start, state, slope = self._bdf.t, self._bdf.y, self._bdf.D[1] / self._bdf.h_abs
+        return lambda time: state + (time - start) * slope
