@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 # Relative weight of the mean tension that keeps the inverse finite for a circle.  There a constant tension
 # is a pressure and moves nothing, so its value does not matter; it must only not be divided by round-off.
-_CIRCLE_SHIFT = 1e-10
+_CIRCLE_SHIFT = 1e-13
 
 
 class TensionNotFoundError(ArithmeticError):
