@@ -15,7 +15,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Self, TypeVar
 
-from pydantic import Field, ValidationError, ValidationInfo, field_validator, model_validator
+from pydantic import AfterValidator, Field, ValidationError, ValidationInfo, field_validator, model_validator
 
 from ensemble.grid import GeometricGrid
 from ensemble.overrides import explain, locations, override, parse_override, value_at
@@ -31,22 +31,31 @@ BRACKET_MARGIN = 2.0
 NO_ANSWER = {Outcome.UNDECIDED: Side.UNDECIDED, Outcome.FAILED: Side.FAILED}
 
 
+def _ascending(ends: tuple[float, float]) -> tuple[float, float]:
+    if not ends[0] < ends[1]:
+        raise ValueError("the first must be less than the second")
+    return ends
+
+
+Bracket = Annotated[tuple[Positive, Positive], AfterValidator(_ascending)]
+
+
+class Guess(Model):
+    """Where the boundary is expected at one value of the sweep: it saves runs and changes no answer."""
+
+    at: float
+    bracket: Bracket
+
+
 class Search(Model):
     """Which critical value is looked for: of what, within which limits, between which outcomes."""
 
     parameter: str  # dotted path in the scene
     tolerance: float = Field(0.01, gt=0, le=0.5)  # relative width that the bracket stays below
-    limits: tuple[Positive, Positive]
-    guess: tuple[Positive, Positive] | None = None  # where it may lie while no other point is known
+    limits: Bracket
+    guesses: tuple[Guess, ...] = ()  # to begin with, until two points of the boundary are known
     low: tuple[Outcome, ...] = Field(min_length=1)  # outcomes below the critical value
     high: tuple[Outcome, ...] = Field(min_length=1)  # outcomes above it
-
-    @field_validator("limits", "guess")
-    @classmethod
-    def _ascending(cls, ends: tuple[float, float] | None) -> tuple[float, float] | None:
-        if ends is not None and not ends[0] < ends[1]:
-            raise ValueError("the first must be less than the second")
-        return ends
 
     @field_validator("limits")
     @classmethod
@@ -171,10 +180,13 @@ class Study(Model):
         Returns
         -------
         (low, high) or None
-            Within the limits; the study's own guess, if any, while nothing is known.
+            Within the limits.  While fewer than two points are known, the study's own guesses stand in for
+            them; None without those.
         """
-        if not known:
-            return self.search.guess
+        if len(known) < 2:
+            known = {guess.at: guess.bracket for guess in self.search.guesses} | dict(known)
+        if not known or sweep_value in known:
+            return known.get(sweep_value)
         centers = {at: math.sqrt(low * high) for at, (low, high) in known.items()}
         nearest, *others = sorted(centers, key=lambda at: abs(at - sweep_value))
         if not others:
@@ -186,7 +198,9 @@ class Study(Model):
         slope = (centers[other] - centers[nearest]) / (other - nearest)
         change = slope * (sweep_value - nearest)
         center = self._within_limits(centers[nearest] + change, math.inf)[0]
-        margin = BRACKET_MARGIN * self.search.tolerance * center + CURVATURE_MARGIN * abs(change)
+        low, high = known[nearest]
+        width = max(BRACKET_MARGIN * self.search.tolerance, (high - low) / (high + low))
+        margin = width * center + CURVATURE_MARGIN * abs(change)
         return self._within_limits(center - margin, center + margin)
 
     def _within_limits(self, low: float, high: float) -> tuple[float, float]:

@@ -134,10 +134,20 @@ def test_a_whole_study_on_a_known_boundary_takes_few_runs() -> None:
 
 def test_a_guess_without_neighbors_is_the_study_s_own() -> None:
     assert HAMAKER.guess_at(0.25, {}) == (0.2, 0.3)
+    low, high = HAMAKER.guess_at(0.75, {}) or (0.0, 0.0)  # between those at 0.5 and 1.0
+    assert 0.3 < low < 0.5 < high < 0.7
+
+
+def test_a_known_point_replaces_the_guess_there() -> None:
+    assert HAMAKER.guess_at(0.5, {0.5: (0.36, 0.37)}) == (0.36, 0.37)
+    low, high = HAMAKER.guess_at(0.75, {0.5: (1.0, 1.0)}) or (0.0, 0.0)
+    assert low < math.sqrt(0.6 * 0.7) / 2 + 1 / 2 < high
 
 
 def test_a_guess_from_one_neighbor_covers_a_constant_and_a_proportional_boundary() -> None:
-    low, high = HAMAKER.guess_at(0.5, {0.25: (0.24, 0.24)}) or (0.0, 0.0)
+    alone = load_study("critical-hamaker", ["search.guesses=[]"])
+    assert alone.guess_at(0.5, {}) is None
+    low, high = alone.guess_at(0.5, {0.25: (0.24, 0.24)}) or (0.0, 0.0)
     assert low == pytest.approx(0.12)
     assert high == pytest.approx(0.48)
 
@@ -227,7 +237,10 @@ def test_a_file_that_is_not_toml_is_named(tmp_path: Path) -> None:
         ("search.limits=[5.0, 0.05]", "search.limits: [5.0, 0.05] — the first must be less than the second"),
         ("search.limits=[1.001, 1.002]", "search.limits: [1.001, 1.002] — must be further apart than"),
         ("search.limits=[0.0, 1.0]", "search.limits.0: 0.0 — input should be greater than 0"),
-        ("search.guess=[0.3, 0.2]", "search.guess: [0.3, 0.2] — the first must be less than the second"),
+        (
+            "search.guesses=[{at = 0.5, bracket = [0.3, 0.2]}]",
+            "search.guesses.0.bracket: [0.3, 0.2] — the first must be less than the second",
+        ),
         ("search.low=['failed']", "search.low: ['failed'] — undecided and failed are no answers"),
         ("search.low=['bound']", "search.high: ['bound'] — must share no outcome with low"),
         ("search.high=[]", "search.high: [] — tuple should have at least 1 item"),
