@@ -46,13 +46,13 @@ class Adhesion:
         adhesion_density(*self._arguments(geometry, closeness), density)
         return density
 
-    def jacobian(self, geometry: Geometry, closeness: Closeness, dx: Array, dy: Array) -> tuple[Array, Array]:
-        """Derivatives of both components by the state, (M·N, state) each, given those of the points."""
+    def jacobian(self, geometry: Geometry, closeness: Closeness) -> tuple[Array, Array]:
+        """Derivatives of both components by the state, (M·N, state) each."""
         size = geometry.membranes.count * geometry.membranes.points
         hessian = np.empty((3, size, size))
         adhesion_hessians(*self._arguments(geometry, closeness), hessian)
         xx, xy, yy = hessian
-        return xx @ dx + xy @ dy, xy @ dx + yy @ dy
+        return geometry.by_state(xx, xy), geometry.by_state(xy, yy)
 
     def _arguments(self, geometry: Geometry, closeness: Closeness) -> tuple[Any, ...]:
         """What the compiled sums over all pairs are given."""

@@ -33,11 +33,13 @@ Array = NDArray[np.float64]
 class Motion:
     """Everything known about one instant.
 
-    velocity : (2, M, N); tension : (M, N); bending, adhesion : force densities (2, M, N)
+    velocity : (2, M, N); turning : n · u_s, (M, N); tension : (M, N)
+    bending, adhesion : force densities (2, M, N)
     """
 
     geometry: Geometry
     velocity: Array
+    turning: Array
     tension: Array
     bending: Array
     adhesion: Array | None
@@ -87,11 +89,8 @@ class Dynamics:
         velocity = self.layer.velocity(density * self.membranes.spacing[:, None])
         if self.flow:
             velocity += self.flow.velocity(geometry)
-        gradient = geometry.arclength_derivative(velocity)
-        stretching = geometry.tangents[0] * gradient[0] + geometry.tangents[1] * gradient[1]
-        tension, correction = self.inextensibility.solve(self.layer, geometry, stretching)
-        velocity += correction
-        return Motion(geometry, velocity, tension, bending, adhesion)
+        free = self.inextensibility.solve(self.layer, geometry, velocity)
+        return Motion(geometry, free.velocity, free.turning, free.tension, bending, adhesion)
 
     def rate(self, state: Array) -> Array:
         """d(state)/dt.
@@ -103,17 +102,9 @@ class Dynamics:
 
     def rate_of(self, motion: Motion) -> Array:
         """`rate` in the state of a motion."""
-        turning = self._turning(motion)
+        turning = motion.turning.copy()
         glide(motion.geometry.curvature, turning, highest_modes(self.membranes.points))
         return np.concatenate([turning.ravel(), motion.velocity.sum(axis=2).ravel() / self.membranes.points])
-
-    @staticmethod
-    def _turning(motion: Motion) -> Array:
-        """n · u_s, (M, N): how fast the membrane's material turns."""
-        gradient = motion.geometry.arclength_derivative(motion.velocity)
-        tangents = motion.geometry.tangents
-        turning: Array = tangents[0] * gradient[1] - tangents[1] * gradient[0]
-        return turning
 
     def jacobian(self, state: Array) -> Array:
         """Derivative of `rate` with the kernel of the single-layer potential held fixed.
@@ -128,7 +119,7 @@ class Dynamics:
         force_x, force_y = self.bending.jacobian(geometry)
         self._add_turning(motion, force_x, force_y)
         if self.adhesion:
-            adhesion_x, adhesion_y = self.adhesion.jacobian(geometry, Closeness(geometry), dx, dy)
+            adhesion_x, adhesion_y = self.adhesion.jacobian(geometry, Closeness(geometry))
             force_x += adhesion_x
             force_y += adhesion_y
         weights = np.repeat(self.membranes.spacing, self.membranes.points)[:, None]
@@ -139,15 +130,15 @@ class Dynamics:
             flow_x, flow_y = self.flow.jacobian(dx, dy)
             ux += flow_x
             uy += flow_y
-        turning = self._turning(motion)
         stretching = self.inextensibility.stretching(geometry, ux, uy)
-        every_point = np.arange(turning.size)
-        stretching[every_point, every_point] += turning.ravel()
+        every_point = np.arange(motion.turning.size)
+        stretching[every_point, every_point] += motion.turning.ravel()
+        stretching *= weights
         inverse, tension_x, tension_y = self.inextensibility.factorize(self.layer, geometry)
-        tension = inverse @ (weights * stretching)
+        tension = inverse @ stretching
         ux += tension_x @ tension
         uy += tension_y @ tension
-        return self._rate_columns(geometry, ux, uy, gliding_speed(geometry.curvature, turning))
+        return self._rate_columns(motion, ux, uy)
 
     def _add_turning(self, motion: Motion, force_x: Array, force_y: Array) -> None:
         """Add what turning a membrane does to its tension, ∂/∂s (σ n δθ), and to its pressure, p t δθ."""
@@ -186,21 +177,25 @@ class Dynamics:
             dy[block, count * points + count + vesicle] = 1.0
         return dx, dy
 
-    def _rate_columns(self, geometry: Geometry, ux: Array, uy: Array, gliding: Array) -> Array:
-        """`rate` for velocity components (M·N, columns), the derivatives of the velocity by the state."""
+    def _rate_columns(self, motion: Motion, ux: Array, uy: Array) -> Array:
+        """`rate_of` for velocity components (M·N, columns), the derivatives of the velocity by the state."""
         count, points = self.membranes.count, self.membranes.points
+        geometry = motion.geometry
         result = np.empty((self.membranes.state_size, ux.shape[1]))
-        matrix, highest = differentiation(points), highest_modes(points)
-        direction = gliding_direction(geometry.curvature)
+        tx, ty = geometry.tangents.reshape(2, -1, 1)
+        turning = result[: count * points]
+        np.multiply(tx, geometry.column_derivative(uy), out=turning)
+        turning -= ty * geometry.column_derivative(ux)
+        curvature, highest = geometry.curvature, highest_modes(points)
+        direction, gliding = gliding_direction(curvature), gliding_speed(curvature, motion.turning)
         for vesicle in range(count):
             block = slice(vesicle * points, (vesicle + 1) * points)
-            wavenumber = 2 * np.pi / self.membranes.length[vesicle]
-            tx, ty = geometry.tangents[:, vesicle, :, None] * wavenumber
-            result[block] = tx * (matrix @ uy[block]) - ty * (matrix @ ux[block])
-            curvature = geometry.curvature[vesicle]
-            result[block] += np.outer(curvature, direction[vesicle] @ result[block])
-            result[block, block] += gliding[vesicle] * wavenumber * matrix
+            result[block] += np.outer(curvature[vesicle], direction[vesicle] @ result[block])
+            result[block, block] += (
+                gliding[vesicle] * self.membranes.wavenumber[vesicle] * differentiation(points)
+            )
             result[block] -= highest @ (highest.T @ result[block])
-            result[count * points + vesicle] = ux[block].mean(axis=0)
-            result[count * points + count + vesicle] = uy[block].mean(axis=0)
+        for component, velocity in enumerate((ux, uy)):
+            first = (points + component) * count
+            result[first : first + count] = velocity.reshape(count, points, -1).mean(axis=1)
         return result

@@ -47,6 +47,11 @@ class Membranes:
         return self.length / self.points
 
     @cached_property
+    def wavenumber(self) -> Array:
+        """2π/length, (M, 1)."""
+        return 2 * np.pi / self.length[:, None]
+
+    @cached_property
     def natural_rate(self) -> float:
         """Slowest rate at which bending acts on a vesicle's own scale, modulus/(length/2π)³ (viscosity 1)."""
         return float(np.min(self.bending_modulus * (2 * np.pi / self.length) ** 3))
@@ -86,9 +91,10 @@ class Geometry:
         np.cos(tangent_angle, out=self.tangents[0])
         np.sin(tangent_angle, out=self.tangents[1])
         self.centers = state[tangent_angle.size :].reshape(2, membranes.count)
-        scale = membranes.length[:, None] / (2 * np.pi)
-        self.points = self.tangents @ integration(membranes.points).T
-        self.points *= scale
+        self.points = (self.tangents.reshape(-1, membranes.points) @ integration(membranes.points).T).reshape(
+            self.tangents.shape
+        )
+        self.points /= membranes.wavenumber
         self.points += self.centers[:, :, None]
 
     @property
@@ -104,7 +110,33 @@ class Geometry:
 
     def arclength_derivative(self, values: Array, order: int = 1) -> Array:
         """∂^order/∂s^order of values (..., M, N)."""
-        scale = (2 * np.pi / self.membranes.length[:, None]) ** order
-        derivative: Array = values @ differentiation(self.membranes.points, order).T
-        derivative *= scale
+        points = self.membranes.points
+        derivative: Array = values.reshape(-1, points) @ differentiation(points, order).T
+        derivative = derivative.reshape(values.shape)
+        derivative *= self.membranes.wavenumber**order
         return derivative
+
+    def by_state(self, by_x: Array, by_y: Array) -> Array:
+        """Derivatives by the state, (rows, state_size), from those by the points' coordinates, (rows, M·N).
+
+        A tangent angle moves all points of its vesicle, x_θ = ∫(−sin θ, cos θ) ds; a center moves them alike.
+        """
+        count, points = self.membranes.count, self.membranes.points
+        size = count * points
+        rows = by_x.shape[0]
+        result = np.empty((rows, self.membranes.state_size))
+        scaled_x, scaled_y = (self.tangents / self.membranes.wavenumber).reshape(2, -1)
+        matrix = integration(points)
+        turned = result[:, :size]
+        np.multiply((by_y.reshape(-1, points) @ matrix).reshape(rows, size), scaled_x, out=turned)
+        turned -= (by_x.reshape(-1, points) @ matrix).reshape(rows, size) * scaled_y
+        result[:, size : size + count] = by_x.reshape(rows, count, points).sum(axis=2)
+        result[:, size + count :] = by_y.reshape(rows, count, points).sum(axis=2)
+        return result
+
+    def column_derivative(self, values: Array) -> Array:
+        """∂/∂s of the columns of values (M·N, columns)."""
+        count, points = self.membranes.count, self.membranes.points
+        derivative: Array = differentiation(points) @ values.reshape(count, points, -1)
+        derivative *= self.membranes.wavenumber[:, :, None]
+        return derivative.reshape(values.shape)

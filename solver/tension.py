@@ -12,6 +12,8 @@ move, because A does not change when a membrane is turned or shifted.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack
@@ -32,6 +34,18 @@ class TensionNotFoundError(ArithmeticError):
     """The iteration for the tension did not converge."""
 
 
+class Inextensible(NamedTuple):
+    """A motion that does not stretch the membranes.
+
+    tension : (M, N); velocity : (2, M, N); turning : (M, N)
+        The tension that achieves it, the velocity with it, and n · u_s, how fast the material turns.
+    """
+
+    tension: Array
+    velocity: Array
+    turning: Array
+
+
 @compiled
 def _conjugate_gradients(
     xx: Array,
@@ -39,46 +53,48 @@ def _conjugate_gradients(
     yy: Array,
     tangents: Array,
     derivative: Array,
-    rate: Array,
+    wavenumber: Array,
     spacing: Array,
     inverse: Array,
-    stretching: Array,
     tolerance: float,
     natural_rate: float,
     limit: int,
+    imposed: Array,
     tension: Array,
     velocity: Array,
+    turning: Array,
 ) -> int:
-    """Solve for the tension; return the number of iterations, or −1 if ``limit`` was not enough.
+    """Write what `Inextensible` holds; return the number of iterations, or −1 if ``limit`` was not enough.
 
-    ``derivative`` is the transposed differentiation matrix; ``rate`` (M, 1) = 2π/length; ``stretching``
-    (M, N) is Div u₀, and ``natural_rate`` a stretching that counts as large.  ``velocity`` (2, M, N) is
-    written with that caused by ``tension`` (M, N).
+    ``derivative`` is the transposed differentiation matrix; ``wavenumber`` (M, 1) = 2π/length; ``imposed``
+    (2, M, N) is the velocity u₀ without tension, and ``natural_rate`` a stretching that counts as large.
     """
-    count, points = stretching.shape
+    count, points = tension.shape
     size = count * points
-    residual = (stretching * spacing).reshape(size)
+    tx, ty = tangents[0], tangents[1]
+    weight = wavenumber * spacing
+    stretching = tx * np.dot(imposed[0], derivative) + ty * np.dot(imposed[1], derivative)
+    residual = (stretching * weight).reshape(size)
     weights = natural_rate * spacing
     natural = np.sqrt(points * np.sum(weights * weights))
     goal = tolerance * max(np.sqrt(np.dot(residual, residual)), natural)
     solution = np.zeros(size)
-    flow_x, flow_y = np.zeros(size), np.zeros(size)
+    flow_x, flow_y = imposed[0].copy().reshape(size), imposed[1].copy().reshape(size)
     direction = np.dot(inverse, residual)
     product = np.dot(residual, direction)
-    tx, ty = tangents[0], tangents[1]
     iteration = 0
     while np.sqrt(np.dot(residual, residual)) > goal:
         if iteration == limit:
             return -1
         iteration += 1
         field = direction.reshape(count, points)
-        fx = (np.dot(field * tx, derivative) * (rate * spacing)).reshape(size)
-        fy = (np.dot(field * ty, derivative) * (rate * spacing)).reshape(size)
+        fx = (np.dot(field * tx, derivative) * weight).reshape(size)
+        fy = (np.dot(field * ty, derivative) * weight).reshape(size)
         ux = np.dot(xx, fx) + np.dot(xy, fy)
         uy = np.dot(xy, fx) + np.dot(yy, fy)
         ux_s = np.dot(ux.reshape(count, points), derivative)
         uy_s = np.dot(uy.reshape(count, points), derivative)
-        image = (-(tx * ux_s + ty * uy_s) * (rate * spacing)).reshape(size)
+        image = (-(tx * ux_s + ty * uy_s) * weight).reshape(size)
         step = product / np.dot(direction, image)
         solution += step * direction
         flow_x += step * ux
@@ -91,11 +107,12 @@ def _conjugate_gradients(
     tension[:] = solution.reshape(count, points)
     velocity[0] = flow_x.reshape(count, points)
     velocity[1] = flow_y.reshape(count, points)
+    turning[:] = wavenumber * (tx * np.dot(velocity[1], derivative) - ty * np.dot(velocity[0], derivative))
     return iteration
 
 
 class Inextensibility:
-    """Finds the tension of all membranes, and the velocity it causes.
+    """Finds the tension of all membranes, and the motion with it.
 
     Parameters
     ----------
@@ -109,8 +126,8 @@ class Inextensibility:
         self.iterations = 0
         self._inverse: Array | None = None
 
-    def solve(self, layer: SingleLayer, geometry: Geometry, stretching: Array) -> tuple[Array, Array]:
-        """Tension (M, N) and its velocity (2, M, N) that cancel ``stretching`` (M, N).
+    def solve(self, layer: SingleLayer, geometry: Geometry, imposed: Array) -> Inextensible:
+        """The motion when all forces but the tension, and the flow, cause the velocity ``imposed`` (2, M, N).
 
         Raises
         ------
@@ -121,26 +138,27 @@ class Inextensibility:
             if inverse is None:
                 self.factorize(layer, geometry)
             membranes = geometry.membranes
-            tension, velocity = np.empty(stretching.shape), np.empty(geometry.tangents.shape)
+            found = Inextensible(
+                np.empty(imposed.shape[1:]), np.empty(imposed.shape), np.empty(imposed.shape[1:])
+            )
             iterations = _conjugate_gradients(
                 layer.xx,
                 layer.xy,
                 layer.yy,
                 geometry.tangents,
                 differentiation(membranes.points).T,
-                2 * np.pi / membranes.length[:, None],
+                membranes.wavenumber,
                 membranes.spacing[:, None],
                 self._inverse,
-                stretching,
                 self.tolerance,
                 membranes.natural_rate,
                 limit,
-                tension,
-                velocity,
+                imposed,
+                *found,
             )
             if iterations >= 0:
                 self.iterations += iterations
-                return tension, velocity
+                return found
         raise TensionNotFoundError("the tension could not be found: the membrane is too distorted")
 
     def factorize(self, layer: SingleLayer, geometry: Geometry) -> tuple[Array, Array, Array]:
@@ -155,43 +173,41 @@ class Inextensibility:
         """
         membranes = geometry.membranes
         points, count = membranes.points, membranes.count
-        matrix = differentiation(points)
-        flow_x, flow_y = np.empty((2, count * points, count * points))
-        for source in range(count):
-            block = slice(source * points, (source + 1) * points)
-            weighted = (2 * np.pi / points) * matrix  # spacing · ∂/∂s
-            xy = layer.xy[:, block] @ weighted
-            tx, ty = geometry.tangents[:, source]
-            flow_x[:, block] = (layer.xx[:, block] @ weighted) * tx + xy * ty
-            flow_y[:, block] = xy * tx + (layer.yy[:, block] @ weighted) * ty
-        system = -self.stretching(geometry, flow_x, flow_y)
-        system *= np.repeat(membranes.spacing, points)[:, None]
-        system = 0.5 * (system + system.T)
-        shift = _CIRCLE_SHIFT * np.trace(system) / points
+        weighted = (2 * np.pi / points) * differentiation(points)  # spacing · ∂/∂s
+
+        def of_tangents(component: Array) -> Array:
+            return (component.reshape(-1, points) @ weighted).reshape(component.shape)
+
+        tx, ty = geometry.tangents.reshape(2, -1)
+        xy = of_tangents(layer.xy)
+        flow_x = of_tangents(layer.xx) * tx + xy * ty
+        flow_y = xy * tx + of_tangents(layer.yy) * ty
+        system = self.stretching(geometry, flow_x, flow_y)
+        system *= -np.repeat(membranes.spacing, points)[:, None]
+        # A circle shifts by a constant; and differentiation loses the highest mode, whose tension gets the
+        # weight of its neighbors.
+        typical = np.trace(system) / (count * points)
+        alternating = np.where(np.arange(points) % 2 == 0, 1.0, -1.0)
+        shift = typical * (_CIRCLE_SHIFT * count + np.outer(alternating, alternating) / points)
         for vesicle in range(count):
             block = slice(vesicle * points, (vesicle + 1) * points)
             system[block, block] += shift
-        # Differentiation loses the highest mode; give its tension the weight of its neighbors.
-        typical = np.trace(system) / (count * points)
-        alternating = np.where(np.arange(points) % 2 == 0, 1.0, -1.0)
-        for vesicle in range(count):
-            block = slice(vesicle * points, (vesicle + 1) * points)
-            system[block, block] += np.outer(alternating, alternating) * typical / points
-        factor, failed = lapack.dpotrf(system, lower=1)
+        # The lower triangle is used alone: the operator is symmetric up to quadrature error.
+        factor, failed = lapack.dpotrf(system.T, lower=0, overwrite_a=1)
         if failed:
             raise TensionNotFoundError("the tension operator is not positive: the membrane is too distorted")
-        lower, _ = lapack.dpotri(factor, lower=1)
-        self._inverse = np.tril(lower) + np.tril(lower, -1).T
+        triangle, _ = lapack.dpotri(factor, lower=0, overwrite_c=1)
+        inverse = np.triu(triangle)
+        inverse += np.triu(triangle, 1).T
+        self._inverse = np.ascontiguousarray(inverse)
         return self._inverse, flow_x, flow_y
 
     @staticmethod
     def stretching(geometry: Geometry, ux: Array, uy: Array) -> Array:
         """x_s · u_s for velocity components (M·N, columns)."""
-        result = np.empty_like(ux)
-        points = geometry.membranes.points
-        matrix = differentiation(points)
-        for vesicle in range(geometry.membranes.count):
-            block = slice(vesicle * points, (vesicle + 1) * points)
-            tx, ty = geometry.tangents[:, vesicle, :, None] * (2 * np.pi / geometry.membranes.length[vesicle])
-            result[block] = tx * (matrix @ ux[block]) + ty * (matrix @ uy[block])
-        return result
+        gradient_x, gradient_y = (geometry.column_derivative(u) for u in (ux, uy))
+        tx, ty = geometry.tangents.reshape(2, -1, 1)
+        gradient_x *= tx
+        gradient_y *= ty
+        gradient_x += gradient_y
+        return gradient_x

@@ -17,12 +17,12 @@ import pytest
 ENSEMBLE = (sys.executable, "-m", "ensemble.cli")
 SECONDS = 240
 
-# Two points of the preset's boundary at a coarse resolution: eight or so runs of about a second.
+# Three points of the preset's boundary at a coarse resolution: a dozen runs of about half a second.
 QUICK_STUDY = (
-    "--set=sweep.values=[0.5, 1.0]",
+    "--set=sweep.values=[0.5, 0.75, 1.0]",
     "--set=scene.numerics.points=32",
     "--set=scene.numerics.tolerance=1e-3",
-    "--tolerance=0.3",
+    "--tolerance=0.1",
 )
 
 

@@ -181,13 +181,16 @@ def test_failed_and_contradictory_runs_are_reported_not_averaged(study: Study) -
 
 def test_finished_searches_tell_the_later_ones_where_to_begin() -> None:
     rates = [0.25, 0.5, 0.75, 1.0, 1.25, 1.5]
-    whole = load_study("critical-hamaker", tolerance=0.01)
+    whole = load_study("critical-hamaker", ["search.guesses=[]"], 0.01)
     assert list(whole.sweep.values) == rates
     together = len(trace(Coordinator(whole, unknown), 1, lambda out: 0))
     apart = sum(
         len(
             trace(
-                Coordinator(load_study("critical-hamaker", [f"sweep.values=[{rate}]"], 0.01), unknown),
+                Coordinator(
+                    load_study("critical-hamaker", ["search.guesses=[]", f"sweep.values=[{rate}]"], 0.01),
+                    unknown,
+                ),
                 1,
                 lambda out: 0,
             )
@@ -299,7 +302,7 @@ def test_a_killed_study_leaves_no_process_and_continues_to_the_same_brackets(
         while not (store / "runs").is_dir() or len(list((store / "runs").iterdir())) < 2:
             assert launched.poll() is None
             time.sleep(0.02)
-        time.sleep(random.Random(victim).uniform(0, 1.5))
+        time.sleep(random.Random(victim).uniform(0, 1.0))
         family = psutil.Process(launched.pid).children(recursive=True)
         VICTIMS[victim](launched).send_signal(signal.SIGKILL)
         _, alive = psutil.wait_procs(family, timeout=SECONDS_TO_DIE)
