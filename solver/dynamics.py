@@ -107,17 +107,16 @@ class Dynamics:
         return np.concatenate([turning.ravel(), motion.velocity.sum(axis=2).ravel() / self.membranes.points])
 
     def jacobian(self, state: Array) -> Array:
-        """Derivative of `rate` with the kernel of the single-layer potential held fixed.
+        """Derivative of `rate`, (state_size, state_size).
 
-        Shape (state_size, state_size).  Dropped are the derivatives of S and of the gliding direction; kept
-        are those of all forces, the tension's direction, the constraint and the flow.  S is applied to the
-        forces without each vesicle's mean pressure, which moves nothing: so what is dropped is least.
+        Dropped is only the change of the gliding direction with the curvature, and that of a refined
+        quadrature with the points.
         """
         motion = self.motion(state)
         geometry = motion.geometry
         dx, dy = self._point_derivatives(geometry)
         force_x, force_y = self.bending.jacobian(geometry)
-        self._add_turning(motion, force_x, force_y)
+        self._add_tension_turning(motion, force_x, force_y)
         if self.adhesion:
             adhesion_x, adhesion_y = self.adhesion.jacobian(geometry, Closeness(geometry))
             force_x += adhesion_x
@@ -126,6 +125,9 @@ class Dynamics:
         force_x *= weights
         force_y *= weights
         ux, uy = self.layer.columns(force_x, force_y)
+        layer_x, layer_y = self.layer.jacobian(geometry, self._point_forces(motion))
+        ux += layer_x
+        uy += layer_y
         if self.flow:
             flow_x, flow_y = self.flow.jacobian(dx, dy)
             ux += flow_x
@@ -140,22 +142,25 @@ class Dynamics:
         uy += tension_y @ tension
         return self._rate_columns(motion, ux, uy)
 
-    def _add_turning(self, motion: Motion, force_x: Array, force_y: Array) -> None:
-        """Add what turning a membrane does to its tension, ∂/∂s (σ n δθ), and to its pressure, p t δθ."""
+    def _point_forces(self, motion: Motion) -> Array:
+        """All forces at the points, (2, M, N)."""
+        geometry = motion.geometry
+        density = motion.bending + geometry.arclength_derivative(motion.tension * geometry.tangents)
+        if motion.adhesion is not None:
+            density += motion.adhesion
+        return density * self.membranes.spacing[:, None]
+
+    def _add_tension_turning(self, motion: Motion, force_x: Array, force_y: Array) -> None:
+        """Add what turning a membrane does to its tension's force, ∂/∂s (σ n δθ)."""
         points = self.membranes.points
         matrix = differentiation(points)
         geometry = motion.geometry
-        tension_force = geometry.arclength_derivative(motion.tension * geometry.tangents)
-        pressure = np.mean(np.sum((motion.bending + tension_force) * geometry.normals, axis=0), axis=1)
         for vesicle in range(self.membranes.count):
             block = slice(vesicle * points, (vesicle + 1) * points)
             scaled = motion.tension[vesicle] * (2 * np.pi / self.membranes.length[vesicle])
             tx, ty = geometry.tangents[:, vesicle]
             force_x[block, block] -= matrix * (scaled * ty)
             force_y[block, block] += matrix * (scaled * tx)
-            every_point = np.arange(block.start, block.stop)
-            force_x[every_point, every_point] += pressure[vesicle] * tx
-            force_y[every_point, every_point] += pressure[vesicle] * ty
 
     def _assemble(self, state: Array) -> tuple[Geometry, Closeness | None]:
         geometry = Geometry(self.membranes, state)

@@ -127,6 +127,35 @@ def complete_self_part(
 
 
 @compiled
+def stokeslet_derivatives(points: Array, forces: Array, xx: Array, xy: Array, yx: Array, yy: Array) -> None:
+    """Fill the derivatives of the velocity at each of ``points`` (2, n) by all of them, (n, n) each.
+
+    The velocity is the sum of Stokeslets of strength ``forces`` (2, n) at the points; with r = x − y and
+    g = F·r, moving r by δ changes one of them by
+    [−F (r·δ) + r (F·δ) + g δ − 2 g r (r·δ)/r²]/(4π r²).  ``xy`` is that of x-velocity by y, and so on.
+    """
+    scale = 1.0 / (4.0 * np.pi)
+    for i in range(points.shape[1]):
+        xi, yi = points[0, i], points[1, i]
+        for j in range(points.shape[1]):
+            dx = xi - points[0, j]
+            dy = yi - points[1, j]
+            fx, fy = forces[0, j], forces[1, j]
+            r2 = dx * dx + dy * dy
+            inverse = scale / (r2 if r2 > 0.0 else np.inf)
+            along = dx * fx + dy * fy
+            pull = 2.0 * along * inverse * inverse * (1.0 / scale)
+            xx[i, j] = -along * inverse + pull * dx * dx
+            xy[i, j] = (fx * dy - dx * fy) * inverse + pull * dx * dy
+            yx[i, j] = (fy * dx - dy * fx) * inverse + pull * dx * dy
+            yy[i, j] = -along * inverse + pull * dy * dy
+        xx[i, i] = -(xx[i].sum() - xx[i, i])
+        xy[i, i] = -(xy[i].sum() - xy[i, i])
+        yx[i, i] = -(yx[i].sum() - yx[i, i])
+        yy[i, i] = -(yy[i].sum() - yy[i, i])
+
+
+@compiled
 def refinement_factors(distance_per_spacing: Array, ratio: float) -> Indices:
     """Least powers of two, at most 32, that times the distance/spacing (n,) of each point reach ``ratio``."""
     factors = np.ones(distance_per_spacing.size, dtype=np.int64)

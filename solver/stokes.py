@@ -83,3 +83,22 @@ class SingleLayer:
     def columns(self, fx: Array, fy: Array) -> tuple[Array, Array]:
         """Velocity components for several point forces at once, (M·N, ...) each."""
         return self.xx @ fx + self.xy @ fy, self.xy @ fx + self.yy @ fy
+
+    def jacobian(self, geometry: Geometry, point_forces: Array) -> tuple[Array, Array]:
+        """Derivatives of `velocity` by the state, (M·N, state_size) each, at fixed point forces (2, M, N).
+
+        Sources that are refined for close targets are differentiated as if they were not.
+        """
+        size = geometry.membranes.count * geometry.membranes.points
+        xx, xy, yx, yy = np.empty((4, size, size))
+        forces = point_forces.reshape(2, -1)
+        kernels.stokeslet_derivatives(geometry.points.reshape(2, -1), forces, xx, xy, yx, yy)
+        by_x, by_y = geometry.by_state(xx, xy), geometry.by_state(yx, yy)
+        # On the diagonal r⊗r/r² is t⊗t, which turns with the tangent.
+        tangents, normals = geometry.tangents.reshape(2, -1), geometry.normals.reshape(2, -1)
+        along, across = np.sum(tangents * forces, axis=0), np.sum(normals * forces, axis=0)
+        turned = (normals * along + tangents * across) / (4 * np.pi)
+        every_point = np.arange(size)
+        by_x[every_point, every_point] += turned[0]
+        by_y[every_point, every_point] += turned[1]
+        return by_x, by_y

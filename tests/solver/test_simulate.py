@@ -154,28 +154,20 @@ def test_a_circle_at_rest_does_not_move() -> None:
     assert run.energy.bending == pytest.approx(np.pi, rel=1e-12)
 
 
-def test_a_circle_beside_a_vesicle_is_given_up_with_a_reason() -> None:
-    """Its tension grows without bound as its excess length vanishes: a known limit, and no wrong answer."""
-    vesicles = (Vesicle(reduced_area=1.0, center=(-1.3, 0.0)), Vesicle(reduced_area=0.8, center=(1.0, 0.0)))
+@pytest.mark.parametrize("excess", [0.0, 1e-8, 1e-6, 1e-4])
+def test_a_nearly_round_vesicle_beside_another_stays_round(excess: float) -> None:
+    """Its tension grows as its excess length vanishes; what is left of it bends no more than that allows."""
+    vesicles = (
+        Vesicle(reduced_area=1 - excess, center=(-1.3, 0.0)),
+        Vesicle(reduced_area=0.8, center=(1.0, 0.0)),
+    )
     run = simulate(
         Scene(
             horizon=20.0,
             vesicles=vesicles,
             adhesion=Adhesion(hamaker=1.0, distance=0.4),
-            numerics=Numerics(work_limit=1000),
+            numerics=Numerics(work_limit=5000),
         )
-    )
-    assert run.outcome is Outcome.FAILED
-    assert run.failure == "the work limit of 1000 evaluations is reached"
-
-
-def test_a_nearly_round_vesicle_beside_another_stays_nearly_round() -> None:
-    vesicles = (
-        Vesicle(reduced_area=0.9999, center=(-1.3, 0.0)),
-        Vesicle(reduced_area=0.8, center=(1.0, 0.0)),
-    )
-    run = simulate(
-        Scene(horizon=20.0, vesicles=vesicles, adhesion=Adhesion(hamaker=1.0, distance=0.4), flow=None)
     )
     assert run.outcome in {Outcome.EQUILIBRIUM, Outcome.UNDECIDED}
     points = frame_points(run)[:, 0] - run.frames.center[:, 0, :, None]
