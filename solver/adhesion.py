@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver import scene
+from solver.adhesion_kernels import adhesion_density, adhesion_energy, adhesion_hessians
 from solver.geometry import Geometry
-from solver.kernels import adhesion_density, adhesion_energy, adhesion_hessians
 from solver.proximity import Closeness
 from solver.quadrature import required_ratio
 from solver.spectral import interpolation
@@ -59,9 +59,7 @@ class Adhesion:
         return (
             geometry.points,
             geometry.membranes.spacing,
-            closeness.distances,
-            self._ratio,
-            closeness.interpolations(self._ratio),
+            closeness.refinement(self._ratio),
             *self._potential,
             self._hamaker * self._potential[1],
         )

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.geometry import Geometry
-from solver.kernels import MAXIMUM_FACTOR, pair_distances
+from solver.kernels import pair_distances
+from solver.refinement import MAXIMUM_FACTOR, Refinement, group_targets
 from solver.spectral import interpolation, interpolations
 
 Array = NDArray[np.float64]
@@ -29,12 +30,12 @@ class Closeness:
         self.distances /= membranes.spacing[:, None]
         self._nearest = float(self.distances.min())
 
-    def interpolations(self, ratio: float) -> Array:
-        """The `spectral.interpolations` that bring every point to ``ratio`` spacings."""
+    def refinement(self, ratio: float) -> Refinement:
+        """The refinement that brings every target to ``ratio`` spacings of every source."""
         factor = 1
         while factor < MAXIMUM_FACTOR and factor * self._nearest < ratio:
             factor *= 2
-        return interpolations(self._points, factor)
+        return Refinement(*group_targets(self.distances, ratio), interpolations(self._points, factor))
 
 
 def gap(geometry: Geometry, refinement: int = 4) -> float:

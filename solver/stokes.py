@@ -15,6 +15,7 @@ from solver import kernels
 from solver.geometry import Geometry, Membranes
 from solver.proximity import Closeness
 from solver.quadrature import required_ratio
+from solver.refinement import refine_single_layer
 from solver.spectral import logarithm_weights
 
 Array = NDArray[np.float64]
@@ -66,13 +67,7 @@ class SingleLayer:
                 *components,
             )
         if closeness is not None:
-            kernels.refine_single_layer(
-                geometry.points,
-                closeness.distances,
-                self._ratio,
-                closeness.interpolations(self._ratio),
-                *components,
-            )
+            refine_single_layer(geometry.points, closeness.refinement(self._ratio), *components)
 
     def velocity(self, point_forces: Array) -> Array:
         """Velocity (2, M, N) that point forces (2, M, N) cause at the membranes' points."""

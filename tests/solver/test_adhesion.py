@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from solver.adhesion import Adhesion
+from solver.adhesion_kernels import adhesion_energy, adhesion_force
 from solver.geometry import Geometry
-from solver.kernels import adhesion_energy, adhesion_force
 from solver.proximity import Closeness, gap
 from solver.scene import Adhesion as AdhesionParameters
 from solver.scene import Numerics, Scene, Vesicle

@@ -177,7 +177,7 @@ def test_vesicles_far_apart_are_not_interpolated(monkeypatch: pytest.MonkeyPatch
     def spied(self: SingleLayer, geometry: Geometry, closeness: Closeness | None) -> None:
         original(self, geometry, closeness)
         assert closeness
-        calls.append(closeness.interpolations(4.0).shape)
+        calls.append(closeness.refinement(4.0).interpolations.shape)
 
     monkeypatch.setattr(SingleLayer, "assemble", spied)
     scene = Scene(horizon=1.0, vesicles=(Vesicle(center=(-4.0, 0.0)), Vesicle(center=(4.0, 0.0))))

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from solver.geometry import Geometry
-from solver.kernels import refinement_factors
 from solver.proximity import Closeness, gap
+from solver.refinement import refinement_factors
 from solver.scene import Numerics, Scene, Vesicle
 from solver.spectral import interpolations
 from tests.solver.references import Ellipse, nearest_parameter
@@ -68,8 +68,20 @@ def test_interpolations_reach_the_largest_factor_that_is_needed() -> None:
     ratio = 3.0
     largest = refinement_factors(closeness.distances[0, 1], ratio).max()
     assert largest == 4
-    np.testing.assert_array_equal(closeness.interpolations(ratio), interpolations(64, largest))
+    np.testing.assert_array_equal(closeness.refinement(ratio).interpolations, interpolations(64, largest))
 
 
 def test_vesicles_far_apart_need_no_interpolation() -> None:
-    assert Closeness(circles(3.0, 0.3)).interpolations(5.0).shape == (0, 64)
+    assert Closeness(circles(3.0, 0.3)).refinement(5.0).interpolations.shape == (0, 64)
+
+
+def test_every_target_is_in_one_group_of_its_factor() -> None:
+    closeness = Closeness(circles(0.1, 0.3))
+    refinement = closeness.refinement(3.0)
+    for target, source in ((0, 1), (1, 0)):
+        factors = refinement_factors(closeness.distances[target, source], 3.0)
+        for factor in (1, 2, 4):
+            (g,) = np.flatnonzero((refinement.groups == (target, source, factor)).all(axis=1))
+            rows = refinement.rows[refinement.starts[g] : refinement.starts[g + 1]]
+            np.testing.assert_array_equal(rows, np.flatnonzero(factors == factor))
+    assert len(refinement.groups) == 6

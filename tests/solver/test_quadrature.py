@@ -7,8 +7,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.special import gamma
 
-from solver.kernels import MAXIMUM_FACTOR, refinement_factors
 from solver.quadrature import required_ratio
+from solver.refinement import MAXIMUM_FACTOR, refinement_factors
 
 Array = NDArray[np.float64]
 

@@ -1,0 +1,116 @@
+"""Refining a vesicle's points for the targets that are close to it.
+
+The trapezoid rule over one membrane is accurate at a target that is a few spacings away (`quadrature`).  For
+nearer ones the membrane is interpolated to a power of two times as many points, decided target by target.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.kernels import compiled, stokeslets
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+MAXIMUM_FACTOR = 32  # beyond it a close target is not resolved
+
+
+class Refinement(NamedTuple):
+    """Which targets see which vesicle at which factor.
+
+    groups : (k, 3)
+        Target vesicle, source vesicle and factor of each group of targets; every target is in exactly one
+        group of every other vesicle.
+    rows, starts : (·,), (k + 1,)
+        ``rows[starts[g]:starts[g + 1]]`` are the points of group g within their vesicle.
+    interpolations : (·, n)
+        `spectral.interpolations` up to the largest factor.
+    """
+
+    groups: Indices
+    rows: Indices
+    starts: Indices
+    interpolations: Array
+
+
+@compiled
+def refinement_factors(distance_per_spacing: Array, ratio: float) -> Indices:
+    """Least powers of two, at most 32, that times the distance/spacing (n,) of each point reach ``ratio``."""
+    factors = np.ones(distance_per_spacing.size, dtype=np.int64)
+    for i in range(factors.size):
+        while factors[i] < MAXIMUM_FACTOR and factors[i] * distance_per_spacing[i] < ratio:
+            factors[i] *= 2
+    return factors
+
+
+@compiled
+def group_targets(distances: Array, ratio: float) -> tuple[Indices, Indices, Indices]:
+    """Make the groups, rows and starts of `Refinement`.
+
+    distances : (M, M, n)
+        Distance over spacing, by target vesicle, source vesicle and point of the target.
+    """
+    count, n = distances.shape[0], distances.shape[2]
+    groups = [(0, 0, 0)][:0]
+    rows = np.empty(count * (count - 1) * n, dtype=np.int64)
+    starts = [0]
+    used = 0
+    for target in range(count):
+        for source in range(count):
+            if target == source:
+                continue
+            factors = refinement_factors(distances[target, source], ratio)
+            factor = 1
+            while factor <= factors.max():
+                found = np.flatnonzero(factors == factor)
+                if found.size > 0:
+                    rows[used : used + found.size] = found
+                    used += found.size
+                    groups.append((target, source, factor))
+                    starts.append(used)
+                factor *= 2
+    table = np.empty((len(groups), 3), dtype=np.int64)
+    for g in range(len(groups)):
+        table[g, 0], table[g, 1], table[g, 2] = groups[g]
+    return table, rows, np.array(starts)
+
+
+@compiled
+def interpolation_to(refinement: Refinement, factor: int) -> Array:
+    """The interpolation matrix (factor·n, n) for a factor of at least 2."""
+    n = refinement.interpolations.shape[1]
+    return refinement.interpolations[(factor - 2) * n : (2 * factor - 2) * n]
+
+
+@compiled
+def refined_points(points: Array, source: int, factor: int, refinement: Refinement) -> Array:
+    """Points (2, factor·n) of one of the vesicles ``points`` (2, M, n)."""
+    coarse = np.ascontiguousarray(points[:, source])
+    return coarse if factor == 1 else np.dot(coarse, interpolation_to(refinement, factor).T)
+
+
+@compiled
+def refine_single_layer(points: Array, refinement: Refinement, xx: Array, xy: Array, yy: Array) -> None:
+    """Replace the rows (·, M·n) of all targets that need a factor above 1, folding refined columns back."""
+    n = points.shape[2]
+    for g in range(refinement.groups.shape[0]):
+        target, source, factor = refinement.groups[g]
+        if factor == 1:
+            continue
+        rows = refinement.rows[refinement.starts[g] : refinement.starts[g + 1]]
+        fine = refined_points(points, source, factor, refinement)
+        shape = (rows.size, fine.shape[1])
+        fine_xx, fine_xy, fine_yy = np.empty(shape), np.empty(shape), np.empty(shape)
+        stokeslets(points[:, target][:, rows], fine, fine_xx, fine_xy, fine_yy)
+        fold = interpolation_to(refinement, factor)
+        folded_xx, folded_xy, folded_yy = np.dot(fine_xx, fold), np.dot(fine_xy, fold), np.dot(fine_yy, fold)
+        first, last = source * n, (source + 1) * n
+        for k in range(rows.size):
+            row = target * n + rows[k]
+            xx[row, first:last] = folded_xx[k] / factor
+            xy[row, first:last] = folded_xy[k] / factor
+            yy[row, first:last] = folded_yy[k] / factor
