@@ -96,14 +96,14 @@ def stokeslets(targets: Array, sources: Array, xx: Array, xy: Array, yy: Array) 
 
 @compiled
 def complete_self_part(
-    regular_part: Array, diagonal: float, tangents: Array, first: int, xx: Array, xy: Array, yy: Array
+    correction: Array, diagonal: float, tangents: Array, first: int, xx: Array, xy: Array, yy: Array
 ) -> None:
     """Turn point Stokeslets of one closed curve on itself into its single-layer quadrature.
 
     Parameters
     ----------
-    regular_part : (n, n)
-        What Kress's split of the logarithm adds off the diagonal, over 4π (`stokes.SingleLayer`).
+    correction : (n, n)
+        What Kress's rule adds off the diagonal (`close_evaluation.logarithm_correction`).
     diagonal : float
         The whole logarithmic part on the diagonal, over 4π.
     tangents : (2, n)
@@ -115,9 +115,9 @@ def complete_self_part(
     for i in range(n):
         row = first + i
         for j in range(n):
-            xx[row, first + j] += regular_part[i, j]
+            xx[row, first + j] += correction[i, j]
         for j in range(n):
-            yy[row, first + j] += regular_part[i, j]
+            yy[row, first + j] += correction[i, j]
         tx, ty = tangents[0, i], tangents[1, i]
         xx[row, row] = diagonal + scale * tx * tx
         xy[row, row] = scale * tx * ty

@@ -35,7 +35,8 @@ class Closeness:
         factor = 1
         while factor < MAXIMUM_FACTOR and factor * self._nearest < ratio:
             factor *= 2
-        return Refinement(*group_targets(self.distances, ratio), interpolations(self._points, factor))
+        groups, rows, starts = group_targets(self.distances, ratio)
+        return Refinement(groups, rows, starts, interpolations(self._points, factor))
 
 
 def gap(geometry: Geometry, refinement: int = 4) -> float:

@@ -3,7 +3,8 @@
 S f(x) = 1/(4π) ∫ (−log r I + r⊗r/r²) f ds,  r = x − y  (viscosity 1).
 
 On its own vesicle the logarithm is split after Kress, ½ log(4 sin²) being integrated exactly; on another
-vesicle the trapezoid rule is used, on refined sources where the target is close (`proximity`).
+vesicle the trapezoid rule is used, on refined sources where the target is close (`refinement`), and Cauchy
+sums where it is very close (`close_evaluation`).
 """
 
 from __future__ import annotations
@@ -12,11 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver import kernels
+from solver.close_evaluation import close_single_layer, logarithm_correction
 from solver.geometry import Geometry, Membranes
 from solver.proximity import Closeness
 from solver.quadrature import required_ratio
-from solver.refinement import refine_single_layer
-from solver.spectral import logarithm_weights
+from solver.refinement import LARGEST_REFINED, refine_single_layer
+from solver.spectral import differentiation
 
 Array = NDArray[np.float64]
 
@@ -44,13 +46,8 @@ class SingleLayer:
         points = membranes.points
         size = membranes.count * points
         self.xx, self.xy, self.yy = np.zeros((3, size, size))
-        alpha = 2 * np.pi * np.arange(points) / points
-        sine = np.sin((alpha[:, None] - alpha) / 2)
-        np.fill_diagonal(sine, 0.5)  # makes the logarithm vanish there
-        weights = logarithm_weights(points) * points / (2 * np.pi)
-        self._regular_part = (0.5 * np.log(4 * sine**2) + weights) / (4 * np.pi)
-        # On the diagonal r²/(4 sin²) tends to (length/2π)².
-        self._diagonal = (weights[0, 0] - np.log(membranes.length / (2 * np.pi))) / (4 * np.pi)
+        self._correction = logarithm_correction(points)
+        self._diagonal = self._correction[0, 0] - np.log(membranes.length / (2 * np.pi)) / (4 * np.pi)
 
     def assemble(self, geometry: Geometry, closeness: Closeness | None) -> None:
         """Fill the components for this geometry; ``closeness`` is None for a single vesicle."""
@@ -60,14 +57,26 @@ class SingleLayer:
         kernels.stokeslets(all_points, all_points, *components)
         for vesicle in range(count):
             kernels.complete_self_part(
-                self._regular_part,
+                self._correction,
                 self._diagonal[vesicle],
                 geometry.tangents[:, vesicle],
                 vesicle * points,
                 *components,
             )
-        if closeness is not None:
-            refine_single_layer(geometry.points, closeness.refinement(self._ratio), *components)
+        if closeness is None:
+            return
+        refinement = closeness.refinement(self._ratio)
+        refine_single_layer(geometry.points, refinement, *components)
+        if refinement.groups[:, 2].max() > LARGEST_REFINED:
+            close_single_layer(
+                geometry.points,
+                geometry.tangents,
+                geometry.membranes.spacing,
+                refinement,
+                self._correction,
+                differentiation(points),
+                *components,
+            )
 
     def velocity(self, point_forces: Array) -> Array:
         """Velocity (2, M, N) that point forces (2, M, N) cause at the membranes' points."""
