@@ -40,9 +40,13 @@ def positions(tangent_angle: Array, center: Array, length: float | Array) -> Arr
 
 
 def area(points: Array, tangent_angle: Array, length: float | Array) -> Array:
-    """Enclosed area ½∮(x dy − y dx) of curves of shape (..., 2, points)."""
+    """Enclosed area ½∮(x dy − y dx) of curves of shape (..., 2, points), about their centers.
+
+    So a curve that does not quite close has the same area everywhere.
+    """
     tangent = tangents(tangent_angle)
-    moment = points[..., 0, :] * tangent[..., 1, :] - points[..., 1, :] * tangent[..., 0, :]
+    offsets = points - points.mean(axis=-1, keepdims=True)
+    moment = offsets[..., 0, :] * tangent[..., 1, :] - offsets[..., 1, :] * tangent[..., 0, :]
     return 0.5 * np.asarray(length) * moment.mean(axis=-1)
 
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from solver import curve, scene
 from solver.dynamics import Dynamics, Motion
+from solver.geometry import Geometry, Membranes
 from solver.orbit import Orbit
 from solver.proximity import gap
 from solver.rheology import adhesion_stress, membrane_stress
@@ -19,23 +20,27 @@ Array = NDArray[np.float64]
 Measure = Callable[[Motion], float]
 
 
-def areas(motion: Motion) -> Array:
-    """Area of each vesicle, (M,)."""
-    geometry = motion.geometry
-    points, tangents = geometry.points, geometry.tangents
-    moment = np.mean(points[0] * tangents[1] - points[1] * tangents[0], axis=1)
+def areas(geometry: Geometry) -> Array:
+    """Area of each vesicle about its center, (M,)."""
+    offsets, tangents = geometry.points - geometry.centers[:, :, None], geometry.tangents
+    moment = np.mean(offsets[0] * tangents[1] - offsets[1] * tangents[0], axis=1)
     return np.asarray(0.5 * geometry.membranes.length * moment)
 
 
-def state_rate(dynamics: Dynamics, motion: Motion) -> float:
-    """Largest rate of change of any tangent angle, or of any center relative to their mean.
+def conserved_quantities(geometry: Geometry) -> Array:
+    """What the exact motion keeps, (3·M,): reduced areas, and what curves fail to close by, over length."""
+    reduced_areas = 4 * np.pi * areas(geometry) / geometry.membranes.length**2
+    return np.concatenate([reduced_areas, geometry.tangents.mean(axis=2).ravel()])
 
-    Zero exactly when shapes and arrangement stay: the points glide (`gliding`), so treading does not count.
+
+def state_rate(membranes: Membranes, change: Array, duration: float) -> float:
+    """Largest rate at which any tangent angle, or any center relative to their mean, changed.
+
+    Zero when shapes and arrangement stay: the points glide (`gliding`), so treading does not count.
     """
-    rate = dynamics.rate_of(motion)
-    turning = dynamics.membranes.tangent_angle(rate)
-    moving = dynamics.membranes.center(rate)
-    return float(max(np.abs(turning).max(), np.abs(moving - moving.mean(axis=0)).max()))
+    turning, moving = membranes.tangent_angle(change), membranes.center(change)
+    relative = moving - moving.mean(axis=0)
+    return float(max(np.abs(turning).max(), np.abs(relative).max()) / duration)
 
 
 def measures(setting: scene.Scene, dynamics: Dynamics) -> dict[str, Measure]:
@@ -44,9 +49,8 @@ def measures(setting: scene.Scene, dynamics: Dynamics) -> dict[str, Measure]:
 
     found: dict[str, Measure] = {
         "bending_energy": lambda motion: dynamics.bending.energy(motion.geometry),
-        "area_error": lambda motion: float(np.max(np.abs(areas(motion) / target_area - 1))),
+        "area_error": lambda motion: float(np.max(np.abs(areas(motion.geometry) / target_area - 1))),
         "closure_error": lambda motion: float(np.max(np.hypot(*motion.geometry.tangents.mean(axis=2)))),
-        "state_rate": lambda motion: state_rate(dynamics, motion),
     }
     adhesion = dynamics.adhesion
     if adhesion:
@@ -72,6 +76,7 @@ class Recorder:
         self._measures = measures(setting, dynamics)
         self._frame_interval = setting.output.frame_interval
         self._frames: list[tuple[float, Array, Array, Array]] = []
+        self._previous: tuple[float, Array] | None = None
         self.values: dict[str, list[float]] = {}
         self.spatial_error = 0.0
 
@@ -85,6 +90,12 @@ class Recorder:
             self._append("center_distance", self._orbit.distance_of(state))
             self._append("center_angle", self._orbit.angle_of(state))
         membranes = self._dynamics.membranes
+        # Between samples: at one, the rate of a stiff state magnifies the noise of the integrator.
+        change, duration = self._dynamics.rate_of(motion), 1.0
+        if self._previous:
+            change, duration = state - self._previous[1], time - self._previous[0]
+        self._append("state_rate", state_rate(membranes, change, duration))
+        self._previous = time, state
         tangent_angle = membranes.tangent_angle(state)
         turned = 2 * np.pi * np.arange(membranes.points) / membranes.points
         self.spatial_error = max(self.spatial_error, float(tail(tangent_angle - turned).max()))

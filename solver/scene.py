@@ -107,8 +107,21 @@ class Numerics(Model):
 
     points: int = Field(64, ge=16, le=1024, multiple_of=2)  # on each vesicle
     tolerance: float = Field(1e-4, ge=1e-12, le=0.1)  # local error of tangent angle and center, absolute
-    integrator: Literal["bdf"] = "bdf"
+    integrator: Literal["bdf", "sdc", "imex-euler"] = "bdf"
+    order: int | None = Field(None, ge=2, le=8)  # of "sdc"; None: its usual one
+    # By the estimated error of each step, or as the paper: by the drift of areas and lengths over the run.
+    step_control: Literal["embedded", "area-length"] = "embedded"
     work_limit: int = Field(1_000_000, ge=1)  # evaluations after which a run is given up
+
+    @model_validator(mode="after")
+    def _options_of_the_integrator(self) -> Self:
+        if self.order is not None and self.integrator != "sdc":
+            raise ValueError(
+                f"order can be chosen for integrator 'sdc' only, got {self.order} with {self.integrator!r}"
+            )
+        if self.step_control == "area-length" and self.integrator == "bdf":
+            raise ValueError("step_control 'area-length' needs integrator 'sdc' or 'imex-euler', got 'bdf'")
+        return self
 
 
 class Criteria(Model):

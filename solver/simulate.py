@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from solver.diagnostics import Recorder
+from solver.diagnostics import Recorder, conserved_quantities
 from solver.dynamics import Dynamics
-from solver.integrators import BackwardDifferentiation, StepFailedError
+from solver.geometry import Geometry
+from solver.integrators import StepFailedError, integrator_for
 from solver.orbit import Orbit
 from solver.outcome import History, criteria_of, latest_time
 from solver.run import Energy, Errors, Outcome, Run, Series, Viscosity, Work
@@ -35,6 +36,7 @@ class _Progress:
     state: Array
     steps: int = 0
     shortened: int = 0
+    smallest_step: float | None = None
     temporal_error: float = 0.0
 
 
@@ -75,11 +77,19 @@ def simulate(
         recorder.record(0.0, start.state)
         if start.failure:
             raise StepFailedError(start.failure)
-        integrator = BackwardDifferentiation(
-            dynamics.rate, dynamics.jacobian, start.state, scene.numerics.tolerance, latest
+        integrator = integrator_for(
+            scene.numerics,
+            dynamics.rate,
+            dynamics.jacobian,
+            lambda state: conserved_quantities(Geometry(dynamics.membranes, state)),
+            start.state,
+            latest,
         )
         while progress.time < latest and outcome is Outcome.UNDECIDED:
             step = integrator.step()
+            if step.end < latest or progress.smallest_step is None:  # the last one ends where the run does
+                taken = float(step.end - step.start)
+                progress.smallest_step = min(progress.smallest_step or taken, taken)
             if orbit:
                 step = orbit.advance(step)
             _record_up_to(step.end, step.interpolate, recorder, scene.output.interval)
@@ -106,6 +116,7 @@ def simulate(
         jacobian_evaluations=integrator.jacobian_evaluations if integrator else 0,
         factorizations=integrator.factorizations if integrator else 0,
         wall_seconds=clock.perf_counter() - began,
+        smallest_step=progress.smallest_step,
     )
     return _summary(scene, outcome, failure, progress, orbit, recorder, work)
 
@@ -223,5 +234,7 @@ def _viscosity(series: Series, outcome: Outcome, orbit: Orbit | None) -> Viscosi
     else:
         return None
     membrane = average("viscosity_bending_tension")
-    adhesion = average("viscosity_adhesion") if "viscosity_adhesion" in series else 0.0
+    if "viscosity_adhesion" not in series:
+        return Viscosity(total=membrane, bending_tension=membrane, adhesion=None)
+    adhesion = average("viscosity_adhesion")
     return Viscosity(total=membrane + adhesion, bending_tension=membrane, adhesion=adhesion)

@@ -1,6 +1,15 @@
-"""Time integrators: one method a module, all behind `Integrator`."""
+"""Time integrators: one method a module, all behind `Integrator`; `integrator_for` chooses."""
 
 from solver.integrators.base import Integrator, Step, StepFailedError
 from solver.integrators.bdf import BackwardDifferentiation
+from solver.integrators.choice import integrator_for
+from solver.integrators.sdc import DeferredCorrection
 
-__all__ = ["BackwardDifferentiation", "Integrator", "Step", "StepFailedError"]
+__all__ = [
+    "BackwardDifferentiation",
+    "DeferredCorrection",
+    "Integrator",
+    "Step",
+    "StepFailedError",
+    "integrator_for",
+]

@@ -40,8 +40,13 @@ class Step:
 class Integrator(Protocol):
     """Advances a state in time, one accepted step after the other."""
 
-    jacobian_evaluations: int
-    factorizations: int
+    @property
+    def jacobian_evaluations(self) -> int:
+        """Number of Jacobians made."""
+
+    @property
+    def factorizations(self) -> int:
+        """Number of matrices factorized."""
 
     def step(self) -> Step:
         """Take one step.
