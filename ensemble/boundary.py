@@ -8,6 +8,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field
 
 from ensemble.timestamp import Timestamp
+from solver.scene import Numerics
 
 BracketEnd = Annotated[float, Field(ge=0)] | None
 
@@ -23,6 +24,8 @@ class BoundaryPoint(BaseModel):
 
     `critical_value` is the geometric mean of the bracket's ends, and None while one of them is unknown.
     `outcomes` are those at the two ends of the bracket, `runs` the keys of the runs behind it.
+    `certified` says that both ends were run again at finer numerics, `certified_by`, and are on their sides
+    there; `outcomes` are then those of the finer runs.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -33,6 +36,7 @@ class BoundaryPoint(BaseModel):
     outcomes: tuple[str | None, str | None]
     status: str
     certified: bool
+    certified_by: Numerics | None = None
     runs: list[str]
 
 

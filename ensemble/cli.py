@@ -19,6 +19,7 @@ import typer
 
 from ensemble.errors import BadInput
 from ensemble.mpi import launched_rank, only_first_rank_speaks, pin_threads
+from ensemble.report import ReportName
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
@@ -80,11 +81,14 @@ def bisect(
     changes: Changes = [],  # noqa: B006  typer copies it
     store: StorePath = DEFAULT_STORE,
     tolerance: Annotated[float | None, typer.Option(help="Relative width of the brackets.")] = None,
+    certify: Annotated[
+        bool, typer.Option("--certify", help="Run both ends of every bracket again at finer numerics.")
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """Trace a boundary, on all ranks, running only what the store does not have.
 
-    The exit status is 0 only if every search converged.
+    The exit status is 0 only if every search converged and every bracket that was to be certified is.
     """
     from ensemble.documents import study_document
     from ensemble.mpi import abort_guard, on_root, world
@@ -93,7 +97,7 @@ def bisect(
 
     communicator = world()
     with abort_guard(communicator):
-        prepared = on_root(communicator, lambda: _prepare(study, changes, tolerance, store))
+        prepared = on_root(communicator, lambda: _prepare(study, changes, tolerance, certify, store))
         traced = _trace(communicator, prepared, store)
     if as_json:
         _print_json(study_document(traced, store))
@@ -104,13 +108,13 @@ def bisect(
     raise typer.Exit(0 if converged else 1)
 
 
-def _prepare(study: str, changes: list[str], tolerance: float | None, store: Path) -> Study:
+def _prepare(study: str, changes: list[str], tolerance: float | None, certify: bool, store: Path) -> Study:
     """Load the study, then create or sweep the store: a study that is refused leaves no trace."""
     from ensemble.store import Store
     from ensemble.study import load_study
 
     with _refusing():
-        loaded = load_study(study, changes, tolerance)
+        loaded = load_study(study, changes, tolerance, certify)
         Store.open(store).close()
     return loaded
 
@@ -236,6 +240,36 @@ def _draw(store: Store, shown: Boundary | str, output: Path) -> None:
             value = parameter_value(summary.scene, shown.study["search"]["parameter"])
             runs.append((at, value, summary.outcome))
     save(phase_diagram(shown, runs), output)
+
+
+@app.command()
+def report(
+    name: Annotated[ReportName, typer.Argument(help="What to report.")],
+    quick: Annotated[bool, typer.Option("--quick", help="Minutes instead of hours.")] = False,
+    store: StorePath = DEFAULT_STORE,
+    as_json: AsJson = False,
+) -> None:
+    """Measure the solver: error against run time, or stiff and extreme scenes.
+
+    The report is written into the store, which keeps its runs too: only what is missing is run.
+    """
+    if launched_rank() != 0:
+        return
+    from rich.console import Console
+    from rich.markdown import Markdown
+
+    from ensemble.report.command import make_report
+    from ensemble.report.progress import report_progress
+
+    with ExitStack() as stack:
+        with _refusing():
+            opened = stack.enter_context(_opened(store))
+        made = make_report(name, opened, quick, stack.enter_context(report_progress(Console(stderr=True))))
+    if as_json:
+        _print_json(made.document.model_dump(mode="json"))
+    else:
+        Console().print(Markdown(made.text))
+        print(made.directory)
 
 
 @app.command()

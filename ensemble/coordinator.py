@@ -3,42 +3,32 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
 
 from ensemble.boundary import Boundary, BoundaryPoint
+from ensemble.certification import Certification, Verdict, finer
 from ensemble.grid import GeometricGrid
-from ensemble.keys import run_key
+from ensemble.inquiry import Inquiry, Task
 from ensemble.parameters import parameter_value
-from ensemble.search import Status
+from ensemble.search import CriticalValue, Status
 from ensemble.study import Study
 from ensemble.timestamp import now
 from solver.run import Outcome
 from solver.scene import Scene
 
+_AnyInquiry = Inquiry[CriticalValue] | Inquiry[Certification]
 
-@dataclass(frozen=True)
-class Task:
-    """A run to make: the scene, its key, and the place in the study whose question it answers."""
-
-    sweep_value: float
-    value: float
-    scene: Scene
-    key: str
-
-
-@dataclass(frozen=True)
-class _Answer:
-    outcome: Outcome
-    key: str
+ENDS = 2  # of a bracket, hence runs of a certification that finds both where they were
 
 
 class Coordinator:
-    """All searches of a study and the tasks that are out.
+    """All searches of a study, the certifications of their brackets, and the tasks that are out.
 
     Searches are worked on in the order of the sweep, one task each before any gets a second one: two workers
     get further on two searches than on one, and finished searches tell the later ones where to begin.
     When there are more workers than searches left, the searches are cut into more than two parts at once.
+    Certifications come before that, as their runs are needed whatever the others say.
 
     Parameters
     ----------
@@ -56,50 +46,54 @@ class Coordinator:
         self._known = known
         grid = GeometricGrid(study.search.tolerance)
         self._values = {grid.value(index) for index in grid.within(*study.search.limits)}
-        self._searches = {at: study.critical_value() for at in study.sweep.values}
-        self._answers: dict[float, dict[float, _Answer]] = {at: {} for at in study.sweep.values}
-        self._pending: dict[float, dict[float, Task]] = {at: {} for at in study.sweep.values}
-        for at, value in filter(None, map(self._place, made)):
-            self._take_known(self._task(at, value))
-        self.known_answers = sum(map(len, self._answers.values()))
+        self._searches = {
+            at: Inquiry(study.critical_value(), at, partial(study.scene_at, at), study.side, known)
+            for at in study.sweep.values
+        }
+        self._certifications: dict[float, Inquiry[Certification]] = {}
+        for at, value in set(filter(None, map(self._place, made))):
+            self._searches[at].take_known(value)
 
     def next_task(self) -> Task | None:
         """Return the most useful task for an idle worker; None if every useful run is out already."""
-        # Sorting is stable: among equally busy searches the order of the sweep holds.
-        for at in sorted(self._searches, key=lambda at: len(self._pending[at])):
-            task = self._next_of(at)
-            if task is not None:
-                self._pending[at][task.value] = task
-                return task
-        return None
+        return next((task for task in map(self._next_of, self._by_use()) if task is not None), None)
 
     def answer(self, task: Task, outcome: Outcome) -> None:
         """Take the outcome of a task's run."""
-        del self._pending[task.sweep_value][task.value]
-        self._take(task, outcome)
+        self._inquiry_of(task).answer(task, outcome)
 
     def cancelled(self, task: Task) -> None:
         """Take back a task whose run was given up."""
-        del self._pending[task.sweep_value][task.value]
-        self._searches[task.sweep_value].withdraw(task.value)
+        self._inquiry_of(task).cancelled(task)
 
     def pointless_tasks(self) -> tuple[Task, ...]:
         """Return the tasks that are out and whose outcome no longer matters."""
-        return tuple(
-            tasks[value]
-            for at, tasks in self._pending.items()
-            for value in sorted(self._searches[at].pointless())
+        needed = list(self._inquiries())
+        # A late answer may have shown that there is no single critical value, hence nothing to certify.
+        overtaken = [inquiry for inquiry in self._certifications.values() if inquiry not in needed]
+        return (
+            *(task for inquiry in needed for task in inquiry.pointless_tasks()),
+            *(task for inquiry in overtaken for task in inquiry.pending.values()),
         )
 
     @property
     def done(self) -> bool:
-        """Whether no search needs any further answer."""
-        return all(search.done for search in self._searches.values())
+        """Whether no search and no certification needs any further answer."""
+        return all(inquiry.asking.done for inquiry in self._inquiries())
+
+    @property
+    def known_answers(self) -> int:
+        """How many answers are from runs made before."""
+        return sum(inquiry.known_answers for inquiry in self._inquiries())
 
     @property
     def runs_left(self) -> float:
-        """How many more answers the searches need, if each halves its bracket."""
-        return sum(self._halvings(at) for at, search in self._searches.items() if not search.done)
+        """How many more answers are needed if each halves a bracket or certifies an end of one."""
+        searching = [at for at, search in self._searches.items() if not search.asking.done]
+        ends = sum(certification.asking.ends_left for certification in self._certifying())
+        if self._study.search.certify:
+            ends += ENDS * len(searching)
+        return sum(map(self._halvings, searching)) + ends
 
     def boundary(self) -> Boundary:
         """Return the boundary as far as it is known."""
@@ -120,58 +114,85 @@ class Coordinator:
             return None
         return (at, value) if at in self._searches and value in self._values else None
 
-    def _task(self, at: float, value: float) -> Task:
-        scene = self._study.scene_at(at, value)
-        return Task(at, value, scene, run_key(scene))
+    def _by_use(self) -> Iterator[_AnyInquiry]:
+        """Give all inquiries, the one whose next task is the most useful first."""
+        # Sorting is stable: among equally busy searches the order of the sweep holds.
+        searches = sorted(self._searches.values(), key=lambda search: len(search.pending))
+        yield from (search for search in searches if not search.pending)
+        yield from self._certifying()
+        yield from (search for search in searches if search.pending)
+        # Known answers may have ended a search on the way here.
+        yield from self._certifying()
 
-    def _next_of(self, at: float) -> Task | None:
-        search = self._searches[at]
-        if not self._answers[at] and not self._pending[at]:
-            guess = self._study.guess_at(at, self._converged())
+    def _next_of(self, inquiry: _AnyInquiry) -> Task | None:
+        if isinstance(inquiry.asking, CriticalValue) and inquiry.untouched:
+            guess = self._study.guess_at(inquiry.sweep_value, self._converged())
             if guess is not None:
-                search.reseed(guess)
-        while (value := search.ask()) is not None:
-            task = self._task(at, value)
-            # Another study on the same store may have made this run in the meantime.
-            if not self._take_known(task):
-                return task
-        return None
+                inquiry.asking.reseed(guess)
+        return inquiry.next_task()
+
+    def _inquiries(self) -> Iterator[_AnyInquiry]:
+        yield from self._searches.values()
+        yield from self._certifying()
+
+    def _inquiry_of(self, task: Task) -> _AnyInquiry:
+        certification = self._certifications.get(task.sweep_value)
+        if certification is not None and task in certification.pending.values():
+            return certification
+        return self._searches[task.sweep_value]
+
+    def _certifying(self) -> list[Inquiry[Certification]]:
+        every = map(self._certification, self._searches)
+        return [certification for certification in every if certification is not None]
+
+    def _certification(self, at: float) -> Inquiry[Certification] | None:
+        """Return the certification of a search that has converged, beginning it if it is new."""
+        bracket = self._converged_bracket(at) if self._study.search.certify else None
+        if bracket is None:
+            return None
+        if at not in self._certifications:
+            self._certifications[at] = Inquiry(
+                self._study.certification(bracket),
+                at,
+                lambda value: finer(self._study.scene_at(at, value)),
+                self._study.side,
+                self._known,
+            )
+            self._certifications[at].take_all_known()
+        return self._certifications[at]
 
     def _converged(self) -> dict[float, tuple[float, float]]:
-        return {
-            at: (low, high)
-            for at, search in self._searches.items()
-            if search.status is Status.CONVERGED
-            for low, high in [search.bracket]
-            if low is not None and high is not None
-        }
+        brackets = {at: self._converged_bracket(at) for at in self._searches}
+        return {at: bracket for at, bracket in brackets.items() if bracket is not None}
 
-    def _take_known(self, task: Task) -> bool:
-        outcome = self._known(task.key)
-        if outcome is not None:
-            self._take(task, outcome)
-        return outcome is not None
-
-    def _take(self, task: Task, outcome: Outcome) -> None:
-        self._searches[task.sweep_value].tell(task.value, self._study.side(outcome))
-        self._answers[task.sweep_value][task.value] = _Answer(outcome, task.key)
+    def _converged_bracket(self, at: float) -> tuple[float, float] | None:
+        search = self._searches[at].asking
+        low, high = search.bracket if search.status is Status.CONVERGED else (None, None)
+        return None if low is None or high is None else (low, high)
 
     def _halvings(self, at: float) -> float:
         limits = self._study.search.limits
-        low, high = (end or limit for end, limit in zip(self._searches[at].bracket, limits, strict=True))
+        bracket = self._searches[at].asking.bracket
+        low, high = (end or limit for end, limit in zip(bracket, limits, strict=True))
         return max(1.0, math.log2(math.log(high / low) / math.log1p(self._study.search.tolerance)))
 
     def _point(self, at: float) -> BoundaryPoint:
-        search, answers = self._searches[at], self._answers[at]
-        low, high = search.bracket
+        search, certification = self._searches[at], self._certification(at)
+        bracket, status, runs = search.asking.bracket, str(search.asking.status), search.runs
+        outcomes, certified_by = search.outcomes(bracket), None
+        if certification is not None:
+            verdict, ends = certification.asking.verdict, certification.asking.bracket
+            status, runs = str(verdict), runs + certification.runs
+            if ends is not None:
+                bracket, outcomes = ends, certification.outcomes(ends)
+                if verdict is Verdict.CONVERGED:
+                    certified_by = finer(self._study.scene_at(at, ends[0])).numerics
         return BoundaryPoint(
             parameters={self._study.sweep.parameter: at},
-            bracket=(low, high),
-            outcomes=(
-                None if low is None else answers[low].outcome,
-                None if high is None else answers[high].outcome,
-            ),
-            status=search.status,
-            certified=False,
-            runs=[answers[value].key for value in sorted(answers)],
+            bracket=bracket,
+            outcomes=outcomes,
+            status=status,
+            certified=certified_by is not None,
+            certified_by=certified_by,
+            runs=runs,
         )

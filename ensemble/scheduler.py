@@ -15,7 +15,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
 
-from ensemble.coordinator import Coordinator, Task
+from ensemble.coordinator import Coordinator
+from ensemble.inquiry import Task
 from ensemble.mpi import abort_guard
 
 if TYPE_CHECKING:

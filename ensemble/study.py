@@ -17,6 +17,7 @@ from typing import Annotated, Any, Self, TypeVar
 
 from pydantic import AfterValidator, Field, ValidationError, ValidationInfo, field_validator, model_validator
 
+from ensemble.certification import Certification, finer
 from ensemble.grid import GeometricGrid
 from ensemble.overrides import explain, locations, override, parse_override, value_at
 from ensemble.search import CriticalValue, Side
@@ -56,6 +57,7 @@ class Search(Model):
     guesses: tuple[Guess, ...] = ()  # to begin with, until two points of the boundary are known
     low: tuple[Outcome, ...] = Field(min_length=1)  # outcomes below the critical value
     high: tuple[Outcome, ...] = Field(min_length=1)  # outcomes above it
+    certify: bool = False  # run the ends of the bracket again at finer numerics
 
     @field_validator("limits")
     @classmethod
@@ -113,7 +115,9 @@ class Study(Model):
             )
         for sweep_value in self.sweep.values:
             for limit in self.search.limits:
-                self.scene_at(sweep_value, limit)
+                scene = self.scene_at(sweep_value, limit)
+                if self.search.certify:
+                    finer(scene)
         return self
 
     def _number_locations(self, field: str, path: str) -> set[tuple[str | int, ...]]:
@@ -162,6 +166,10 @@ class Study(Model):
     def critical_value(self, guess: tuple[float, float] | None = None) -> CriticalValue:
         """Return a new search for one point of the boundary."""
         return CriticalValue(GeometricGrid(self.search.tolerance), self.search.limits, guess)
+
+    def certification(self, bracket: tuple[float, float]) -> Certification:
+        """Return a new certification of the bracket at which one of the searches has converged."""
+        return Certification(GeometricGrid(self.search.tolerance), self.search.limits, bracket)
 
     def guess_at(
         self, sweep_value: float, known: Mapping[float, tuple[float, float]]
@@ -215,7 +223,10 @@ def preset_names() -> tuple[str, ...]:
 
 
 def load_study(
-    name_or_path: str | Path, overrides: Iterable[str] = (), tolerance: float | None = None
+    name_or_path: str | Path,
+    overrides: Iterable[str] = (),
+    tolerance: float | None = None,
+    certify: bool = False,
 ) -> Study:
     """Read a study from a preset or a TOML file.
 
@@ -227,6 +238,8 @@ def load_study(
         ``path=value`` with paths from the top of the document, such as ``scene.numerics.points=128``.
     tolerance : float, optional
         Replaces the relative tolerance of the search.
+    certify : bool
+        Have the brackets certified, also if the document does not ask for it.
 
     Raises
     ------
@@ -236,6 +249,8 @@ def load_study(
     changes = dict(parse_override(text) for text in overrides)
     if tolerance is not None:
         changes["search.tolerance"] = tolerance
+    if certify:
+        changes["search.certify"] = True
     return _load(Study, name_or_path, changes)
 
 

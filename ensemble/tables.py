@@ -15,7 +15,7 @@ _ABSENT = "–"
 
 def boundary_columns(points: Sequence[BoundaryPoint]) -> list[str]:
     """Headings for `boundary_cells`."""
-    return [*points[0].parameters, "critical value", "bracket", "outcomes", "status", "runs"]
+    return [*points[0].parameters, "critical value", "bracket", "outcomes", "status", "certified by", "runs"]
 
 
 def boundary_cells(point: BoundaryPoint) -> list[str]:
@@ -26,6 +26,7 @@ def boundary_cells(point: BoundaryPoint) -> list[str]:
         bracket_text(point),
         " | ".join(outcome or "?" for outcome in point.outcomes),
         point.status,
+        _certifying_numerics(point),
         str(len(point.runs)),
     ]
 
@@ -33,6 +34,11 @@ def boundary_cells(point: BoundaryPoint) -> list[str]:
 def bracket_text(point: BoundaryPoint) -> str:
     """The two ends of a bracket, a question mark where one is unknown."""
     return " – ".join("?" if end is None else f"{end:.6g}" for end in point.bracket)
+
+
+def _certifying_numerics(point: BoundaryPoint) -> str:
+    numerics = point.certified_by
+    return _ABSENT if numerics is None else f"{numerics.points} points, {numerics.tolerance:g}"
 
 
 def boundary_table(boundary: Boundary) -> Table:
@@ -68,7 +74,7 @@ def runs_table(summaries: Sequence[RunSummary]) -> Table:
 
 def boundaries_table(boundaries: Sequence[Boundary]) -> Table:
     """Boundaries, one a row."""
-    table = Table(_whole("boundary"), "name", "points", "converged", "updated")
+    table = Table(_whole("boundary"), "name", "points", "converged", "certified", "updated")
     for boundary in boundaries:
         converged = sum(point.status == "converged" for point in boundary.points)
         table.add_row(
@@ -76,6 +82,7 @@ def boundaries_table(boundaries: Sequence[Boundary]) -> Table:
             boundary.name,
             str(len(boundary.points)),
             str(converged),
+            str(sum(point.certified for point in boundary.points)),
             f"{boundary.updated:%Y-%m-%d %H:%M:%S}",
         )
     return table

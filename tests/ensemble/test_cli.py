@@ -31,7 +31,16 @@ RUN_FIELDS = {
     "wall_seconds",
     "run_key",
 }
-POINT_FIELDS = {"parameters", "critical_value", "bracket", "outcomes", "status", "certified", "runs"}
+POINT_FIELDS = {
+    "parameters",
+    "critical_value",
+    "bracket",
+    "outcomes",
+    "status",
+    "certified",
+    "certified_by",
+    "runs",
+}
 
 REFUSED = {
     "unknown key": (["run", "doublet-shear", "--set=nonsense=1"], "nonsense"),
@@ -159,7 +168,9 @@ def test_bisect_prints_the_documented_fields(finished_study):
     assert document.keys() == {"study", "boundary", "wall_seconds", "busy_fraction", "store"}
     assert document["study"] == "critical-hamaker"
     assert Path(document["store"]) == finished_study.store
-    assert [point["parameters"] for point in document["boundary"]] == [{"flow.rate": 0.5}, {"flow.rate": 1.0}]
+    assert [point["parameters"] for point in document["boundary"]] == [
+        {"flow.rate": rate} for rate in (0.5, 0.75, 1.0)
+    ]
     for point in document["boundary"]:
         assert point.keys() == POINT_FIELDS
         low, high = point["bracket"]
@@ -167,7 +178,7 @@ def test_bisect_prints_the_documented_fields(finished_study):
         assert point["outcomes"] == ["separated", "bound"]
         assert point["status"] == "converged"
     # Where others have found it: 0.3 to 0.4 and 0.6 to 0.7.
-    first, second = (point["bracket"] for point in document["boundary"])
+    first, _, second = (point["bracket"] for point in document["boundary"])
     assert first[0] < 0.4
     assert first[1] > 0.3
     assert second[0] < 0.7
@@ -187,7 +198,7 @@ def test_the_exit_status_tells_that_a_search_did_not_converge(ensemble, tmp_path
         "bisect",
         "--set=sweep.values=[0.5]",
         "--set=search.limits=[1.5, 2.5]",
-        "--set=search.guess=[1.6, 2.4]",
+        "--set=search.guesses=[{at = 0.5, bracket = [1.6, 2.4]}]",
         "--set=scene.numerics.points=32",
         "--set=scene.numerics.tolerance=1e-3",
         "--tolerance=0.3",

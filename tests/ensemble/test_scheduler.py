@@ -18,7 +18,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ensemble.coordinator import Coordinator, Task
+from ensemble.coordinator import Coordinator
+from ensemble.inquiry import Task
 from ensemble.scheduler import Usage
 from ensemble.store import Store
 from ensemble.study import Study, load_study

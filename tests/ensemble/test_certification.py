@@ -1,0 +1,497 @@
+"""Certified brackets depend on the physics at both numerics alone, and only their own runs are added."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import signal
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import psutil
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ensemble.boundary import BoundaryPoint
+from ensemble.certification import Certification, Verdict, finer
+from ensemble.coordinator import Coordinator
+from ensemble.grid import GeometricGrid
+from ensemble.inquiry import Task
+from ensemble.keys import run_key
+from ensemble.search import Side
+from ensemble.store import Store
+from ensemble.study import Study, load_study
+from ensemble.tables import boundary_cells, boundary_columns
+from solver.run import Outcome
+from solver.scene import Numerics, Shear
+
+GRID = GeometricGrid(0.05)
+LIMITS = (0.05, 5.0)
+INDICES = GRID.within(*LIMITS)
+SECONDS_TO_DIE = 5
+
+Physics = Callable[[int], Side]  # the side of the value at a grid index, at the finer numerics
+
+indices = st.integers(INDICES[0], INDICES[-1])
+
+
+def certification(low: int) -> Certification:
+    return Certification(GRID, LIMITS, (GRID.value(low), GRID.value(low + 1)))
+
+
+def finish(certifying: Certification, physics: Physics, workers: int = 1, order: Random | None = None) -> int:
+    """Certify to the end; with an order answers arrive in it and some are lost.  The number of answers."""
+    pending: list[float] = []
+    answers = 0
+    while not certifying.done:
+        while len(pending) < workers and (value := certifying.ask()) is not None:
+            pending.append(value)
+        assert pending, "a certification that is not done must have asked for something"
+        value = pending.pop(0 if order is None else order.randrange(len(pending)))
+        if order is not None and order.random() < 0.2:
+            certifying.withdraw(value)
+        else:
+            certifying.tell(value, physics(GRID.index(value)))
+            answers += 1
+    assert certifying.ask() is None
+    assert certifying.pointless() == frozenset(pending)
+    return answers
+
+
+def expected(low: int, physics: Physics) -> tuple[Verdict, tuple[float, float] | None]:
+    """What the physics says, by looking at every value."""
+    lows = [index for index in INDICES if index <= low and physics(index) is Side.LOW]
+    highs = [index for index in INDICES if index > low and physics(index) is Side.HIGH]
+    if not lows or not highs:
+        return Verdict.UNCERTIFIED, None
+    bracket = (GRID.value(lows[-1]), GRID.value(highs[0]))
+    reversed_below = any(physics(index) is Side.HIGH for index in range(lows[-1], low + 1))
+    reversed_above = any(physics(index) is Side.LOW for index in range(low + 1, highs[0]))
+    return (Verdict.NON_MONOTONE if reversed_below and reversed_above else Verdict.CONVERGED), bracket
+
+
+@st.composite
+def any_physics(draw: st.DrawFn) -> Physics:
+    """A threshold, a zone without answers, and values with any answer at all."""
+    first_high = draw(st.integers(INDICES[0], INDICES[-1] + 1))
+    zone = range(first_high - draw(st.integers(0, 12)), first_high + draw(st.integers(0, 12)))
+    odd = draw(st.dictionaries(indices, st.sampled_from(Side), max_size=20))
+
+    def side(index: int) -> Side:
+        if index in odd:
+            return odd[index]
+        if index in zone:
+            return Side.UNDECIDED
+        return Side.LOW if index < first_high else Side.HIGH
+
+    return side
+
+
+@given(
+    low=st.integers(INDICES[0], INDICES[-1] - 1),
+    physics=any_physics(),
+    workers=st.integers(1, 4),
+    order=st.none() | st.randoms(use_true_random=False),
+    told=st.sets(indices, max_size=10),
+)
+def test_verdict_and_bracket_depend_on_the_physics_alone(
+    low: int, physics: Physics, workers: int, order: Random | None, told: set[int]
+) -> None:
+    certifying = certification(low)
+    for index in told:
+        certifying.tell(GRID.value(index), physics(index))
+    finish(certifying, physics, workers, order)
+    assert (certifying.verdict, certifying.bracket) == expected(low, physics)
+
+
+@pytest.mark.parametrize(
+    ("shift", "bracket", "answers"),
+    [(0, (10, 11), 2), (-1, (9, 11), 3), (-3, (7, 11), 5), (2, (10, 13), 4)],
+)
+def test_a_shifted_threshold_widens_the_bracket_on_its_side_only(
+    shift: int, bracket: tuple[int, int], answers: int
+) -> None:
+    certifying = certification(10)
+    made = finish(certifying, lambda index: Side.LOW if index < 11 + shift else Side.HIGH)
+    assert certifying.verdict is Verdict.CONVERGED
+    assert certifying.bracket == tuple(map(GRID.value, bracket))
+    assert made == answers
+
+
+def test_an_end_without_an_answer_moves_on() -> None:
+    silent = {10: Side.FAILED, 9: Side.UNDECIDED}
+    certifying = certification(10)
+    finish(certifying, lambda index: silent.get(index, Side.LOW if index < 11 else Side.HIGH))
+    assert certifying.verdict is Verdict.CONVERGED
+    assert certifying.bracket == (GRID.value(8), GRID.value(11))
+
+
+def test_both_ends_are_tried_at_once_and_a_lost_end_makes_the_other_pointless() -> None:
+    certifying = certification(INDICES[0])
+    low, high = certifying.ask(), certifying.ask()
+    assert (low, high) == (GRID.value(INDICES[0]), GRID.value(INDICES[1]))
+    assert certifying.ask() is None
+    assert certifying.ends_left == 2
+    assert low is not None
+    certifying.tell(low, Side.HIGH)
+    assert certifying.verdict is Verdict.UNCERTIFIED
+    assert certifying.pointless() == {high}
+
+
+def test_finer_means_twice_the_points_and_a_tenth_of_the_tolerance() -> None:
+    scene = load_study("critical-hamaker", ["scene.numerics.tolerance=1e-3"]).scene
+    fine = finer(scene)
+    assert fine.numerics == Numerics(points=2 * scene.numerics.points, tolerance=1e-4)
+    assert fine.model_copy(update={"numerics": scene.numerics}) == scene
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        ("scene.numerics.points=1024", "numerics.points: 2048"),
+        ("scene.numerics.tolerance=1e-12", "numerics.tolerance"),
+    ],
+)
+def test_numerics_that_cannot_be_finer_are_refused_at_once(ensemble, tmp_path, change: str, field: str):
+    assert not load_study("critical-hamaker", [change]).search.certify
+    result = ensemble("bisect", "--certify", f"--set={change}", "--store=store", cwd=tmp_path)
+    assert result.returncode == 2
+    assert field in result.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+# Studies: searches and certifications together.
+
+
+@dataclass(frozen=True)
+class TwoNumerics:
+    """Outcomes that depend on the numerics: thresholds apart, and a factor of values without an answer."""
+
+    shift: float = 1.0  # finer threshold over coarse threshold
+    silence: float = 1.0  # finer runs from threshold/silence up to threshold·silence are undecided
+
+    def __call__(self, task: Task) -> Outcome:
+        assert task.scene.adhesion is not None
+        assert isinstance(task.scene.flow, Shear)
+        critical = 0.1 + 0.571 * task.scene.flow.rate
+        ratio = task.scene.adhesion.hamaker / critical
+        if is_finer(task):
+            ratio /= self.shift
+            if 1 / self.silence < ratio < self.silence:
+                return Outcome.UNDECIDED
+        return Outcome.BOUND if ratio > 1 else Outcome.SEPARATED
+
+
+def is_finer(task: Task) -> bool:
+    return task.scene.numerics.points == 128
+
+
+def unknown(_: str) -> None:
+    return None
+
+
+@pytest.fixture(scope="module")
+def study() -> Study:
+    return load_study("critical-hamaker", ["sweep.values=[0.25, 0.75, 1.5]"], 0.05, certify=True)
+
+
+def trace(
+    coordinator: Coordinator,
+    answer: Callable[[Task], Outcome],
+    workers: int = 1,
+    choose: Callable[[int], int] = lambda out: 0,
+) -> list[Task]:
+    """Keep workers busy, finishing at each turn the task that `choose` picks among those out."""
+    out: list[Task] = []
+    made: list[Task] = []
+    while not coordinator.done:
+        while len(out) < workers and (task := coordinator.next_task()) is not None:
+            out.append(task)
+        if not out:
+            assert coordinator.done, "known answers were all that it needed"
+            break
+        made.append(out.pop(choose(len(out))))
+        coordinator.answer(made[-1], answer(made[-1]))
+        for pointless in coordinator.pointless_tasks():
+            out.remove(pointless)
+            coordinator.cancelled(pointless)
+    assert not out
+    assert coordinator.next_task() is None
+    return made
+
+
+def answers(points: list[BoundaryPoint]) -> list[dict[str, Any]]:
+    """Points without their runs: workers may try more values than are needed."""
+    return [point.model_dump(exclude={"runs"}) for point in points]
+
+
+numerics_apart = st.builds(
+    TwoNumerics, shift=st.floats(0.7, 1.4), silence=st.sampled_from([1.0, 1.0, 1.02, 1.2])
+)
+
+
+@settings(deadline=None, max_examples=20)
+@given(physics=numerics_apart, workers=st.integers(1, 9), data=st.data())
+def test_certified_points_depend_neither_on_the_workers_nor_on_the_order_of_answers(
+    study: Study, physics: TwoNumerics, workers: int, data: st.DataObject
+) -> None:
+    alone, together = Coordinator(study, unknown), Coordinator(study, unknown)
+    trace(alone, physics)
+    made = trace(together, physics, workers, lambda out: data.draw(st.integers(0, out - 1)))
+    assert answers(together.boundary().points) == answers(alone.boundary().points)
+    assert len({task.key for task in made}) == len(made)
+    for point in together.boundary().points:
+        low, high = point.bracket
+        critical = 0.1 + 0.571 * point.parameters["flow.rate"]
+        assert low is not None
+        assert high is not None
+        assert low <= min(critical, critical * physics.shift)
+        assert max(critical, critical * physics.shift) < high
+        assert point.outcomes == ("separated", "bound")
+        assert (point.status, point.certified) == ("converged", True)
+        assert point.certified_by == Numerics(points=128, tolerance=1e-5)
+        finer_keys = {task.key for task in made if is_finer(task)}
+        assert len(finer_keys.intersection(point.runs)) >= 2
+
+
+@settings(deadline=None, max_examples=15)
+@given(physics=numerics_apart, kept=st.sets(st.integers(0, 60)))
+def test_what_is_known_is_never_run_again_and_changes_nothing(
+    study: Study, physics: TwoNumerics, kept: set[int]
+) -> None:
+    first = Coordinator(study, unknown)
+    made = trace(first, physics, 3, lambda out: out - 1)
+    known = {task.key: physics(task) for index, task in enumerate(made) if index in kept}
+    resumed = Coordinator(study, known.get, [task.scene for task in made])
+    again = trace(resumed, physics, 2)
+    assert answers(resumed.boundary().points) == answers(first.boundary().points)
+    assert not {task.key for task in again} & known.keys()
+    assert resumed.known_answers == len(known)
+
+
+def test_asked_for_later_a_certification_adds_only_its_own_runs(study: Study) -> None:
+    physics = TwoNumerics(shift=1.2)
+    plain = Coordinator(load_study("critical-hamaker", ["sweep.values=[0.25, 0.75, 1.5]"], 0.05), unknown)
+    searched = trace(plain, physics)
+    assert not any(is_finer(task) for task in searched)
+    assert {(point.certified, point.certified_by) for point in plain.boundary().points} == {(False, None)}
+
+    known = {task.key: physics(task) for task in searched}
+    certified = Coordinator(study, known.get, [task.scene for task in searched])
+    added = trace(certified, physics, 2)
+    assert added
+    assert all(is_finer(task) for task in added)
+
+    known |= {task.key: physics(task) for task in added}
+    again = Coordinator(study, known.get, [task.scene for task in (*searched, *added)])
+    assert again.done
+    assert again.next_task() is None
+    assert again.known_answers == len(searched) + len(added)
+    assert again.runs_left == 0
+    assert again.boundary().points == certified.boundary().points
+
+
+def test_a_point_is_its_search_until_both_ends_are_certified(study: Study) -> None:
+    one_point = load_study("critical-hamaker", ["sweep.values=[0.5]"], 0.05, certify=True)
+    coordinator, physics = Coordinator(one_point, unknown), TwoNumerics()
+    while (task := coordinator.next_task()) is not None and not is_finer(task):
+        coordinator.answer(task, physics(task))
+    other = coordinator.next_task()
+    assert task is not None
+    assert other is not None
+    assert coordinator.next_task() is None
+    (point,) = coordinator.boundary().points
+    assert (task.value, other.value) == point.bracket, "both ends at once"
+    assert (point.status, point.certified, point.certified_by) == ("certifying", False, None)
+    assert coordinator.runs_left == 2
+    coordinator.answer(task, Outcome.FAILED)
+    assert coordinator.boundary().points[0].bracket == point.bracket
+    assert coordinator.boundary().points[0].status == "certifying"
+
+
+def test_what_cannot_be_certified_says_so_and_keeps_its_bracket(study: Study) -> None:
+    physics = TwoNumerics()
+    plain = Coordinator(load_study("critical-hamaker", ["sweep.values=[0.25, 0.75, 1.5]"], 0.05), unknown)
+    trace(plain, physics)
+    failing = Coordinator(study, unknown)
+    trace(failing, lambda task: Outcome.FAILED if is_finer(task) else physics(task), 2)
+    for point, searched in zip(failing.boundary().points, plain.boundary().points, strict=True):
+        assert (point.status, point.certified, point.certified_by) == ("uncertified", False, None)
+        assert (point.bracket, point.outcomes) == (searched.bracket, searched.outcomes)
+
+
+def test_a_contradiction_at_the_finer_numerics_is_reported(study: Study) -> None:
+    physics = TwoNumerics()
+    values: dict[float, list[float]] = {}
+    swapped = {Outcome.BOUND: Outcome.SEPARATED, Outcome.SEPARATED: Outcome.BOUND}
+
+    def contrary(task: Task) -> Outcome:
+        """Two finer runs of a point, those at the ends of its bracket, come out on the wrong sides."""
+        if is_finer(task):
+            values.setdefault(task.sweep_value, []).append(task.value)
+            if len(values[task.sweep_value]) <= 2:
+                return swapped[physics(task)]
+        return physics(task)
+
+    coordinator = Coordinator(study, unknown)
+    trace(coordinator, contrary, 8)
+    for point in coordinator.boundary().points:
+        assert (point.status, point.certified) == ("non-monotone", False)
+        low, high = point.bracket
+        assert low is not None
+        assert high is not None
+        assert GRID.index(high) - GRID.index(low) == 3
+
+
+def test_a_late_answer_that_contradicts_the_search_ends_its_certification() -> None:
+    one_point = load_study("critical-hamaker", ["sweep.values=[0.5]"], 0.05, certify=True)
+    coordinator, physics = Coordinator(one_point, unknown), TwoNumerics()
+    late = coordinator.next_task()
+    assert late is not None
+    while (task := coordinator.next_task()) is not None and not is_finer(task):
+        coordinator.answer(task, physics(task))
+    assert task is not None
+    assert late in coordinator.pointless_tasks()
+    above = late.value > task.value
+    coordinator.answer(late, Outcome.SEPARATED if above else Outcome.BOUND)
+    assert coordinator.boundary().points[0].status == "non-monotone"
+    assert coordinator.done
+    assert coordinator.pointless_tasks() == (task,)
+    coordinator.cancelled(task)
+    assert coordinator.next_task() is None
+
+
+def test_certifying_comes_before_a_second_task_of_one_search() -> None:
+    two_points = load_study("critical-hamaker", ["sweep.values=[0.5, 1.0]"], 0.05, certify=True)
+    coordinator, physics = Coordinator(two_points, unknown), TwoNumerics()
+    tasks: list[Task] = []
+    while not any(map(is_finer, tasks)):
+        task = coordinator.next_task()
+        assert task is not None
+        tasks.append(task)
+        if task.sweep_value == 0.5 and not is_finer(task):
+            coordinator.answer(task, physics(task))
+    other_end, second = coordinator.next_task(), coordinator.next_task()
+    assert tasks[-1].sweep_value == 0.5
+    assert len([task for task in tasks if task.sweep_value == 1.0]) == 1
+    assert other_end is not None
+    assert is_finer(other_end)
+    assert second is not None
+    assert second.sweep_value == 1.0
+
+
+def test_a_search_that_others_finish_meanwhile_is_certified_at_once() -> None:
+    one_point = load_study("critical-hamaker", ["sweep.values=[0.5]"], 0.05, certify=True)
+    known: dict[str, Outcome] = {}
+    coordinator, physics = Coordinator(one_point, known.get), TwoNumerics()
+    out = coordinator.next_task()
+    scenes = [one_point.scene_at(0.5, GRID.value(index)) for index in INDICES]
+    tasks = [
+        Task(0.5, GRID.value(i), scene, run_key(scene)) for i, scene in zip(INDICES, scenes, strict=True)
+    ]
+    known.update({task.key: physics(task) for task in tasks})
+    task = coordinator.next_task()
+    assert task is not None
+    assert is_finer(task)
+    assert coordinator.pointless_tasks() == (out,)
+
+
+def test_tables_name_the_numerics_and_old_documents_are_read() -> None:
+    document = {
+        "parameters": {"flow.rate": 0.5},
+        "bracket": (0.25, 1.0),
+        "outcomes": ("separated", "bound"),
+        "status": "converged",
+        "certified": False,
+        "runs": [],
+    }
+    old = BoundaryPoint.model_validate(document)
+    new = old.model_copy(update={"certified": True, "certified_by": Numerics(points=128, tolerance=1e-5)})
+    assert BoundaryPoint.model_validate_json(new.model_dump_json()) == new
+    shown = [dict(zip(boundary_columns([p]), boundary_cells(p), strict=True)) for p in (old, new)]
+    assert [cells["certified by"] for cells in shown] == ["–", "128 points, 1e-05"]
+
+
+# From here on: real ranks, real simulations, real kills.
+
+
+def runs_made(store: Path, points: int) -> dict[str, str]:
+    """Time of creation of every committed run with this many points."""
+    with Store.existing(store) as opened:
+        found = opened.summaries([f"numerics.points={points}"])
+    return {summary.key: summary.created.isoformat() for summary in found}
+
+
+def certified_points(stdout: str) -> list[dict[str, Any]]:
+    return [point | {"runs": None} for point in json.loads(stdout)["boundary"]]
+
+
+@pytest.fixture(scope="module")
+def certified_store(launcher, bisect_command, finished_study, tmp_path_factory) -> tuple[Path, str]:
+    """The finished study, certified afterwards: the store and standard output."""
+    store = tmp_path_factory.mktemp("certified") / "store"
+    shutil.copytree(finished_study.store, store)
+    result = launcher.run(2, [*bisect_command(store), "--certify"])
+    assert result.returncode == 0, result.stderr
+    return store, result.stdout
+
+
+def test_a_finished_study_is_certified_by_new_runs_alone(
+    launcher, bisect_command, finished_study, certified_store
+):
+    store, stdout = certified_store
+    assert runs_made(store, points=32) == runs_made(finished_study.store, points=32)
+    certifying = runs_made(store, points=64)
+    points = json.loads(stdout)["boundary"]
+    assert len(certifying) >= 2 * len(points)
+    for point, searched in zip(points, finished_study.document["boundary"], strict=True):
+        assert point["status"] == "converged"
+        assert point["certified"] is True
+        assert (point["certified_by"]["points"], point["certified_by"]["tolerance"]) == (64, 1e-4)
+        assert point["outcomes"] == ["separated", "bound"]
+        assert point["bracket"][0] <= searched["bracket"][0] < searched["bracket"][1] <= point["bracket"][1]
+        assert len(certifying.keys() & set(point["runs"])) >= 2
+
+    again = launcher.run(2, [*bisect_command(store), "--certify"])
+    assert again.returncode == 0, again.stderr
+    assert certified_points(again.stdout) == certified_points(stdout)
+    assert json.loads(again.stdout)["busy_fraction"] is None
+    assert runs_made(store, points=64) == certifying
+
+
+def test_killed_while_certifying_it_continues_to_the_same_certified_brackets(
+    launcher, bisect_command, finished_study, certified_store, tmp_path
+):
+    store = tmp_path / "store"
+    shutil.copytree(finished_study.store, store)
+    command = [*bisect_command(store), "--certify"]
+    launched = launcher.start(2, command)
+    family: list[psutil.Process] = []
+    try:
+        while not runs_made(store, points=64):
+            assert launched.poll() is None
+            time.sleep(0.02)
+        family = psutil.Process(launched.pid).children(recursive=True)
+        launched.send_signal(signal.SIGKILL)
+        _, alive = psutil.wait_procs(family, timeout=SECONDS_TO_DIE)
+        assert not alive
+    finally:
+        for process in family:
+            if process.is_running():
+                process.kill()
+        launched.kill()
+        launched.wait()
+
+    kept, whole = runs_made(store, points=64), runs_made(certified_store[0], points=64)
+    assert 0 < len(kept) < len(whole), "it was not killed in the middle"
+    result = launcher.run(2, command)
+    assert result.returncode == 0, result.stderr
+    assert certified_points(result.stdout) == certified_points(certified_store[1])
+    assert kept.items() <= runs_made(store, points=64).items(), "a committed run was made again"
+    with Store.existing(store) as opened:
+        assert opened.check() == []
