@@ -28,11 +28,11 @@ class Outcome(StrEnum):
 
 @dataclass(frozen=True)
 class Viscosity:
-    """Intrinsic viscosity averaged over time (DESIGN: −∫ f_x y ds / (rate·area))."""
+    """Intrinsic viscosity −∫ f_x y ds/(rate·area), averaged over time; no adhesion part without adhesion."""
 
     total: float
     bending_tension: float
-    adhesion: float
+    adhesion: float | None
 
 
 @dataclass(frozen=True)
@@ -69,6 +69,7 @@ class Work:
     jacobian_evaluations: int
     factorizations: int
     wall_seconds: float
+    smallest_step: float | None = None  # accepted, in time; None if none was taken
 
 
 # Diagnostics by name, each of shape (time,) and sampled at `Series["time"]`.  Always present: time,

@@ -1,0 +1,208 @@
+"""Stiff and extreme scenes: what a solver of vesicles is likely to break on.
+
+Every scene differs from an ordinary doublet or vesicle in the few ways that its name says.  The first of each
+group is what a quick report runs.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any
+
+from solver.scene import (
+    Adhesion,
+    Criteria,
+    Extension,
+    Flow,
+    Numerics,
+    Output,
+    Scene,
+    Shear,
+    Start,
+    Trap,
+    Vesicle,
+)
+from solver.shapes import semi_axes
+
+WORK_LIMIT = 40_000  # evaluations
+SAMPLES = 200  # of the diagnostics in a run
+
+AT_REST = 50.0  # horizons
+IN_FLOW = 20.0
+LONG = 1e4
+
+
+def _scene(
+    *vesicles: Vesicle,
+    flow: Flow | None = None,
+    horizon: float | None = None,
+    adhesion: Adhesion | None = None,
+    numerics: Mapping[str, Any] = MappingProxyType({}),
+    criteria: Mapping[str, Any] = MappingProxyType({}),
+    start: Start | None = None,
+) -> Scene:
+    end = horizon or (AT_REST if flow is None else IN_FLOW)
+    return Scene(
+        horizon=end,
+        vesicles=vesicles,
+        flow=flow,
+        adhesion=adhesion,
+        numerics=Numerics.model_validate({"work_limit": WORK_LIMIT} | dict(numerics)),
+        criteria=Criteria.model_validate({"extensions": 1.0} | dict(criteria)),
+        output=Output(interval=end / SAMPLES, frame_interval=end / 10),
+        start=start or Start(),
+    )
+
+
+def _pair(
+    gap: float = 1.0,
+    hamaker: float = 1.5,
+    distance: float = 0.4,
+    exponents: tuple[int, int] = (4, 2),
+    reduced_area: float = 0.9,
+    bending_modulus: float = 1.0,
+    shift: float = 0.2,
+    **rest: Any,
+) -> Scene:
+    """Two upright vesicles side by side, ``gap`` apart and a little shifted against each other."""
+    _, half_width = semi_axes(reduced_area, 2 * math.pi)
+    vesicles = (
+        Vesicle(
+            reduced_area=reduced_area,
+            bending_modulus=bending_modulus,
+            center=(side * (half_width + gap / 2), side * shift / 2),
+        )
+        for side in (-1, 1)
+    )
+    adhesion = Adhesion(hamaker=hamaker, distance=distance, exponents=exponents)
+    return _scene(*vesicles, adhesion=adhesion, **rest)
+
+
+def _unequal(first: Mapping[str, Any], second: Mapping[str, Any], **rest: Any) -> Scene:
+    """Two upright vesicles that differ, one length unit apart."""
+    placed = []
+    for side, fields in ((-1, first), (1, second)):
+        vesicle = Vesicle(**fields)
+        _, half_width = semi_axes(vesicle.reduced_area, vesicle.length)
+        center = (side * (half_width + 0.5), side * 0.1)
+        placed.append(vesicle.model_copy(update={"center": center}))
+    return _scene(*placed, adhesion=Adhesion(hamaker=1.5, distance=0.4), **rest)
+
+
+_SHEAR = Shear(rate=0.5)
+
+GROUPS: Mapping[str, Mapping[str, Scene]] = MappingProxyType(
+    {
+        "potential": {
+            "exponents (12, 6), shear": _pair(exponents=(12, 6), flow=_SHEAR),
+            "exponents (12, 6), distance 0.1, shear": _pair(
+                gap=0.3, exponents=(12, 6), distance=0.1, flow=_SHEAR
+            ),
+            "exponents (24, 12), shear": _pair(exponents=(24, 12), flow=_SHEAR),
+            "exponents (24, 12), at rest": _pair(gap=0.6, exponents=(24, 12)),
+            "exponents (24, 12), distance 0.1, H 10, at rest": _pair(
+                gap=0.15, exponents=(24, 12), distance=0.1, hamaker=10.0
+            ),
+        },
+        # Strong enough for the membranes to be drawn together whatever the distance: H·distance is constant.
+        "adhesion distance": {
+            "distance 0.1, at rest": _pair(gap=0.2, distance=0.1, hamaker=6.0),
+            "distance 0.4, at rest": _pair(gap=0.8, distance=0.4, hamaker=1.5),
+            "distance 0.2, at rest": _pair(gap=0.4, distance=0.2, hamaker=3.0),
+            "distance 0.05, at rest": _pair(gap=0.1, distance=0.05, hamaker=12.0),
+            "distance 0.02, at rest": _pair(gap=0.04, distance=0.02, hamaker=30.0),
+            "distance 0.01, at rest": _pair(gap=0.02, distance=0.01, hamaker=60.0),
+            "distance 0.05, shear": _pair(gap=0.1, distance=0.05, hamaker=12.0, flow=_SHEAR),
+            "distance 0.01, shear": _pair(gap=0.02, distance=0.01, hamaker=60.0, flow=_SHEAR),
+            "distance 0.02, at rest, N 256": _pair(
+                gap=0.04, distance=0.02, hamaker=30.0, numerics={"points": 256}
+            ),
+        },
+        "adhesion strength": {
+            "H 100, at rest": _pair(hamaker=100.0),
+            "H 10, at rest": _pair(hamaker=10.0),
+            "H 1000, at rest": _pair(hamaker=1000.0),
+            "H 1000, shear": _pair(hamaker=1000.0, flow=_SHEAR),
+            "H 0.001, shear": _pair(hamaker=1e-3, flow=_SHEAR),
+            "H 0, shear": _pair(hamaker=0.0, flow=_SHEAR),
+        },
+        "reduced area": {
+            "reduced area 0.5, shear": _pair(reduced_area=0.5, flow=_SHEAR),
+            "reduced area 0.3, shear": _pair(reduced_area=0.3, flow=_SHEAR),
+            "reduced area 0.999, shear": _pair(reduced_area=0.999, flow=_SHEAR),
+            "reduced area 1, shear": _pair(reduced_area=1.0, flow=_SHEAR),
+            "reduced area 0.3, at rest": _pair(reduced_area=0.3),
+            "reduced area 1, at rest": _pair(reduced_area=1.0),
+            "reduced area 0.3, one vesicle, at rest": _scene(Vesicle(reduced_area=0.3)),
+            "reduced area 1, one vesicle, shear": _scene(Vesicle(reduced_area=1.0), flow=_SHEAR),
+            "reduced area 0.3, trap": _pair(reduced_area=0.3, flow=Trap(rate=0.05)),
+        },
+        "bending modulus": {
+            "bending modulus 0.01, shear": _pair(bending_modulus=1e-2, flow=_SHEAR),
+            "bending modulus 0.0001, shear": _pair(bending_modulus=1e-4, flow=_SHEAR),
+            "bending modulus 0.0001, H 0.0001, shear": _pair(bending_modulus=1e-4, hamaker=1e-4, flow=_SHEAR),
+            "bending modulus 100, shear": _pair(bending_modulus=1e2, flow=_SHEAR),
+            "bending modulus 100, at rest": _pair(bending_modulus=1e2),
+            "bending modulus 0.0001, one vesicle, shear": _scene(Vesicle(bending_modulus=1e-4), flow=_SHEAR),
+        },
+        "flow rate": {
+            "shear rate 10": _pair(flow=Shear(rate=10.0), horizon=10.0),
+            "shear rate 0.001": _pair(flow=Shear(rate=1e-3), horizon=1000.0),
+            "shear rate 100": _pair(flow=Shear(rate=100.0), horizon=2.0),
+            "shear rate 100, one vesicle": _scene(Vesicle(), flow=Shear(rate=100.0), horizon=2.0),
+            "shear rate 100, H 1000": _pair(hamaker=1000.0, flow=Shear(rate=100.0), horizon=2.0),
+            "extension rate 10": _pair(flow=Extension(rate=10.0), horizon=2.0),
+            "trap, rate 1": _pair(flow=Trap(rate=1.0), horizon=IN_FLOW),
+        },
+        "arrangement": {
+            "start at a quarter of the adhesion distance, at rest": _pair(gap=0.1),
+            "start at a hundredth of the adhesion distance, at rest": _pair(gap=0.004),
+            "start at a quarter of the adhesion distance, (12, 6), at rest": _pair(
+                gap=0.1, exponents=(12, 6)
+            ),
+            "start 20 apart, at rest": _pair(gap=20.0),
+            "start 20 apart, shear": _pair(gap=20.0, shift=0.5, flow=_SHEAR, horizon=200.0),
+            "lengths 1 to 4, shear": _unequal({"length": math.pi}, {"length": 4 * math.pi}, flow=_SHEAR),
+            "bending moduli 0.01 and 100, shear": _unequal(
+                {"bending_modulus": 1e-2}, {"bending_modulus": 1e2}, flow=_SHEAR
+            ),
+            "lengths 1 to 4, bending moduli 100 and 0.01, at rest": _unequal(
+                {"length": math.pi, "bending_modulus": 1e2},
+                {"length": 4 * math.pi, "bending_modulus": 1e-2},
+            ),
+        },
+        "resolution": {
+            "N 16, shear": _pair(numerics={"points": 16}, flow=_SHEAR),
+            "N 16, distance 0.1, shear": _pair(gap=0.3, distance=0.1, numerics={"points": 16}, flow=_SHEAR),
+            "N 32, reduced area 0.4, shear": _pair(reduced_area=0.4, numerics={"points": 32}, flow=_SHEAR),
+            "N 256, shear": _pair(numerics={"points": 256}, flow=_SHEAR),
+            "N 512, shear": _pair(numerics={"points": 512}, flow=_SHEAR, horizon=5.0),
+            "tolerance 0.1, shear": _pair(numerics={"tolerance": 0.1}, flow=_SHEAR),
+            "tolerance 1e-10, shear": _pair(numerics={"tolerance": 1e-10}, flow=_SHEAR),
+        },
+        "long runs": {
+            "T 10000, one vesicle, shear": _scene(
+                Vesicle(), flow=_SHEAR, horizon=LONG, criteria={"steady_time": LONG}
+            ),
+            "T 10000, at rest": _pair(horizon=LONG, criteria={"steady_time": LONG}),
+            "T 10000, trap": _pair(
+                gap=0.4,
+                shift=0.01,
+                reduced_area=0.8,
+                hamaker=0.7,
+                flow=Trap(rate=0.05),
+                horizon=LONG,
+                criteria={"steady_time": LONG},
+                start=Start(relaxed=True, horizon=2 * LONG),  # as steady as the run itself
+            ),
+            "T 10000, shear": _pair(
+                flow=_SHEAR,
+                horizon=LONG,
+                criteria={"revolutions": 10_000},
+                numerics={"work_limit": 10 * WORK_LIMIT},
+            ),
+        },
+    }
+)
