@@ -7,18 +7,16 @@ has the opposite sign.)
 
 from __future__ import annotations
 
-from itertools import combinations
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver import scene
-from solver.adhesion_kernels import adhesion_density, adhesion_energy, adhesion_hessians
+from solver.adhesion_kernels import adhesion_density, adhesion_energies, adhesion_hessians
 from solver.geometry import Geometry
 from solver.proximity import Closeness
 from solver.quadrature import required_ratio
-from solver.spectral import interpolation
 
 Array = NDArray[np.float64]
 
@@ -55,21 +53,13 @@ class Adhesion:
         return geometry.by_state(xx, xy), geometry.by_state(xy, yy)
 
     def _arguments(self, geometry: Geometry, closeness: Closeness) -> tuple[Any, ...]:
-        """What the compiled sums over all pairs are given."""
-        return (
-            geometry.points,
-            geometry.membranes.spacing,
-            closeness.refinement(self._ratio),
-            *self._potential,
-            self._hamaker * self._potential[1],
-        )
+        """What the compiled sums of forces over all pairs are given."""
+        return *self._sums(geometry, closeness), self._hamaker * self._potential[1]
 
-    def energy(self, geometry: Geometry, refinement: int = 2) -> float:
-        """∫∫ φ ds ds summed over all pairs, on points interpolated ``refinement`` times."""
-        points = geometry.points @ interpolation(geometry.membranes.points, refinement).T
-        spacing = geometry.membranes.spacing / refinement
-        total = 0.0
-        for first, second in combinations(range(len(spacing)), 2):
-            pair = adhesion_energy(points[:, first], points[:, second], *self._potential)
-            total += spacing[first] * spacing[second] * pair
-        return self._hamaker * total
+    def _sums(self, geometry: Geometry, closeness: Closeness) -> tuple[Any, ...]:
+        refinement = closeness.refinement(self._ratio)
+        return geometry.points, geometry.membranes.spacing, refinement, *self._potential
+
+    def energy(self, geometry: Geometry, closeness: Closeness) -> float:
+        """∫∫ φ ds ds summed over all pairs."""
+        return float(self._hamaker * adhesion_energies(*self._sums(geometry, closeness)))

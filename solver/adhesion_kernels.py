@@ -109,6 +109,22 @@ def adhesion_hessian(
 
 
 @compiled
+def adhesion_energies(
+    points: Array, spacing: Array, refinement: Refinement, distance: float, m: int, n: int
+) -> float:
+    """∫∫ (δ/r)^m − (m/n)(δ/r)^n ds ds summed over all pairs of vesicles."""
+    total = 0.0
+    for g in range(refinement.groups.shape[0]):
+        target, source, factor = refinement.groups[g]
+        rows = refinement.rows[refinement.starts[g] : refinement.starts[g + 1]]
+        fine = refined_points(points, source, factor, refinement)
+        pair = adhesion_energy(points[:, target][:, rows], fine, distance, m, n)
+        # Every pair comes twice, once from either side.
+        total += 0.5 * spacing[target] * spacing[source] / factor * pair
+    return total
+
+
+@compiled
 def adhesion_density(
     points: Array,
     spacing: Array,

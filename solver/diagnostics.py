@@ -11,7 +11,7 @@ from solver import curve, scene
 from solver.dynamics import Dynamics, Motion
 from solver.geometry import Geometry, Membranes
 from solver.orbit import Orbit
-from solver.proximity import gap
+from solver.proximity import Closeness, gap
 from solver.rheology import adhesion_stress, membrane_stress
 from solver.run import Frames, Series
 from solver.spectral import tail
@@ -54,7 +54,7 @@ def measures(setting: scene.Scene, dynamics: Dynamics) -> dict[str, Measure]:
     }
     adhesion = dynamics.adhesion
     if adhesion:
-        found["adhesion_energy"] = lambda motion: adhesion.energy(motion.geometry)
+        found["adhesion_energy"] = lambda motion: adhesion.energy(motion.geometry, Closeness(motion.geometry))
     if len(setting.vesicles) > 1:
         found["gap"] = lambda motion: gap(motion.geometry)
     else:

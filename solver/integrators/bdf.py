@@ -37,14 +37,15 @@ class BackwardDifferentiation:
         tolerance: float,
         end: float,
     ) -> None:
+        self._rate, self._jacobian = rate, jacobian
         self._bdf = BDF(
-            lambda _, y: rate(y),
+            self._rate_or_nan,
             0.0,
             state,
             end,
             rtol=100 * np.finfo(float).eps,  # the least that SciPy accepts; set to zero below
             atol=tolerance,
-            jac=lambda _, y: jacobian(y),
+            jac=self._jacobian_or_last,
         )
         self._bdf.rtol = 0.0
         self._bdf.newton_tol = _NEWTON_TOLERANCE
@@ -86,3 +87,20 @@ class BackwardDifferentiation:
             return predictor
         start, state, slope = self._bdf.t, self._bdf.y, self._bdf.D[1] / self._bdf.h_abs
         return lambda time: state + (time - start) * slope
+
+    def _rate_or_nan(self, _: float, state: Array) -> Array:
+        """The rate; where there is none, NaN: SciPy then tries a smaller step."""
+        try:
+            return self._rate(state)
+        except ArithmeticError:
+            return np.full_like(state, np.nan)
+
+    def _jacobian_or_last(self, _: float, state: Array) -> Array:
+        """The Jacobian; where there is none, the last one, for a step that will be rejected."""
+        try:
+            return self._jacobian(state)
+        except ArithmeticError:
+            if not hasattr(self, "_bdf"):  # the first state of all
+                raise
+            last: Array = self._bdf.J
+            return last

@@ -30,6 +30,11 @@ def density(scene: Scene, geometry: Geometry, accuracy: float = 1e-12) -> Array:
     return Adhesion(scene.adhesion, accuracy).density(geometry, Closeness(geometry))
 
 
+def energy_of(adhesion: Adhesion, scene: Scene) -> float:
+    geometry = geometry_of(scene)
+    return adhesion.energy(geometry, Closeness(geometry))
+
+
 def total_force(geometry: Geometry, force: Array) -> Array:
     return np.sum(force.sum(axis=2) * geometry.membranes.spacing, axis=1)
 
@@ -66,7 +71,7 @@ def test_the_force_is_minus_the_gradient_of_the_energy(exponents: tuple[int, int
     adhesion = Adhesion(scene.adhesion, 1e-12)
     around = [Geometry(membranes, state + k * step * direction) for k in (-2, -1, 1, 2)]
     weights = np.array([1, -8, 8, -1]) / (12 * step)
-    energy_change = weights @ [adhesion.energy(g, refinement=4) for g in around]
+    energy_change = weights @ [adhesion.energy(g, Closeness(g)) for g in around]
     displacement = np.tensordot(weights, [g.points for g in around], axes=1)
     work = np.sum(density(scene, geometry) * displacement * membranes.spacing[:, None])
     assert work == pytest.approx(-energy_change, rel=1e-7)
@@ -145,10 +150,10 @@ def test_the_energy_counts_every_pair_once() -> None:
     assert scene.adhesion
     adhesion = Adhesion(scene.adhesion, 1e-12)
     parts = [
-        adhesion.energy(geometry_of(scene.model_copy(update={"vesicles": (first, second)})))
+        energy_of(adhesion, scene.model_copy(update={"vesicles": (first, second)}))
         for first, second in combinations(scene.vesicles, 2)
     ]
-    assert adhesion.energy(geometry_of(scene)) == pytest.approx(sum(parts), rel=1e-14)
+    assert energy_of(adhesion, scene) == pytest.approx(sum(parts), rel=1e-14)
 
 
 def test_the_energy_of_a_pair_against_brute_force() -> None:
@@ -163,7 +168,7 @@ def test_the_energy_of_a_pair_against_brute_force() -> None:
     q = scene.adhesion.distance / np.hypot(*offset)
     weight = 2 * np.pi / 800
     exact = 1.3 * weight**2 * first.speed(alpha) @ (q**4 - 2 * q**2) @ second.speed(alpha)
-    energy = Adhesion(scene.adhesion, 1e-12).energy(geometry_of(scene))
+    energy = energy_of(Adhesion(scene.adhesion, 1e-12), scene)
     assert energy == pytest.approx(exact, rel=1e-11)
 
 

@@ -98,7 +98,9 @@ def test_forces_feed_what_the_fluid_dissipates() -> None:
     energy = []
     for k in (-2, -1, 1, 2):
         geometry = Geometry(dynamics.membranes, state + k * step * rate)
-        energy.append(dynamics.bending.energy(geometry) + dynamics.adhesion.energy(geometry))
+        energy.append(
+            dynamics.bending.energy(geometry) + dynamics.adhesion.energy(geometry, Closeness(geometry))
+        )
     change = np.array([1, -8, 8, -1]) @ energy / (12 * step)
     motion = dynamics.motion(state)
     assert motion.adhesion is not None
