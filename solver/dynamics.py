@@ -114,7 +114,6 @@ class Dynamics:
         """
         motion = self.motion(state)
         geometry = motion.geometry
-        dx, dy = self._point_derivatives(geometry)
         force_x, force_y = self.bending.jacobian(geometry)
         self._add_tension_turning(motion, force_x, force_y)
         if self.adhesion:
@@ -129,7 +128,7 @@ class Dynamics:
         ux += layer_x
         uy += layer_y
         if self.flow:
-            flow_x, flow_y = self.flow.jacobian(dx, dy)
+            flow_x, flow_y = self.flow.jacobian(*self._point_derivatives(geometry))
             ux += flow_x
             uy += flow_y
         stretching = self.inextensibility.stretching(geometry, ux, uy)
