@@ -8,8 +8,6 @@ Curves run counterclockwise; the normal (−sin θ, cos θ) points inward.
 
 from __future__ import annotations
 
-from typing import cast
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -39,20 +37,19 @@ def positions(tangent_angle: Array, center: Array, length: float | Array) -> Arr
     return points
 
 
-def area(points: Array, tangent_angle: Array, length: float | Array) -> Array:
-    """Enclosed area ½∮(x dy − y dx) of curves of shape (..., 2, points), about their centers.
+def area(points: Array, tangents: Array, length: float | Array) -> Array:
+    """Enclosed area ½∮(x dy − y dx) of curves, points and tangents of shape (..., 2, points).
 
-    So a curve that does not quite close has the same area everywhere.
+    It is taken about their centers, so a curve that does not quite close has the same area everywhere.
     """
-    tangent = tangents(tangent_angle)
     offsets = points - points.mean(axis=-1, keepdims=True)
-    moment = offsets[..., 0, :] * tangent[..., 1, :] - offsets[..., 1, :] * tangent[..., 0, :]
+    moment = offsets[..., 0, :] * tangents[..., 1, :] - offsets[..., 1, :] * tangents[..., 0, :]
     return 0.5 * np.asarray(length) * moment.mean(axis=-1)
 
 
-def closure(tangent_angle: Array) -> Array:
-    """How far each curve is from closing, |mean of the tangent| (relative to its length)."""
-    return cast(Array, np.linalg.norm(tangents(tangent_angle).mean(axis=-1), axis=-1))
+def closure(tangents: Array) -> Array:
+    """How far curves are from closing relative to their length, |mean of the tangent|, (..., 2, points)."""
+    return np.asarray(np.linalg.norm(tangents.mean(axis=-1), axis=-1))
 
 
 def inclination(points: Array) -> Array:
@@ -61,4 +58,4 @@ def inclination(points: Array) -> Array:
     xx = np.mean(offset[..., 0, :] ** 2, axis=-1)
     yy = np.mean(offset[..., 1, :] ** 2, axis=-1)
     xy = np.mean(offset[..., 0, :] * offset[..., 1, :], axis=-1)
-    return cast(Array, 0.5 * np.arctan2(2 * xy, xx - yy))
+    return np.asarray(0.5 * np.arctan2(2 * xy, xx - yy))

@@ -11,7 +11,7 @@ from solver import curve, scene
 from solver.dynamics import Dynamics, Motion
 from solver.geometry import Geometry, Membranes
 from solver.orbit import Orbit
-from solver.proximity import Closeness, gap
+from solver.proximity import gap
 from solver.rheology import adhesion_stress, membrane_stress
 from solver.run import Frames, Series
 from solver.spectral import tail
@@ -21,10 +21,9 @@ Measure = Callable[[Motion], float]
 
 
 def areas(geometry: Geometry) -> Array:
-    """Area of each vesicle about its center, (M,)."""
-    offsets, tangents = geometry.points - geometry.centers[:, :, None], geometry.tangents
-    moment = np.mean(offsets[0] * tangents[1] - offsets[1] * tangents[0], axis=1)
-    return np.asarray(0.5 * geometry.membranes.length * moment)
+    """Area of each vesicle, (M,)."""
+    points, tangents = geometry.points.swapaxes(0, 1), geometry.tangents.swapaxes(0, 1)
+    return curve.area(points, tangents, geometry.membranes.length)
 
 
 def conserved_quantities(geometry: Geometry) -> Array:
@@ -50,11 +49,16 @@ def measures(setting: scene.Scene, dynamics: Dynamics) -> dict[str, Measure]:
     found: dict[str, Measure] = {
         "bending_energy": lambda motion: dynamics.bending.energy(motion.geometry),
         "area_error": lambda motion: float(np.max(np.abs(areas(motion.geometry) / target_area - 1))),
-        "closure_error": lambda motion: float(np.max(np.hypot(*motion.geometry.tangents.mean(axis=2)))),
+        "closure_error": lambda motion: float(curve.closure(motion.geometry.tangents.swapaxes(0, 1)).max()),
     }
     adhesion = dynamics.adhesion
     if adhesion:
-        found["adhesion_energy"] = lambda motion: adhesion.energy(motion.geometry, Closeness(motion.geometry))
+
+        def adhesion_energy(motion: Motion) -> float:
+            assert motion.closeness is not None
+            return adhesion.energy(motion.geometry, motion.closeness)
+
+        found["adhesion_energy"] = adhesion_energy
     if len(setting.vesicles) > 1:
         found["gap"] = lambda motion: gap(motion.geometry)
     else:
@@ -91,9 +95,10 @@ class Recorder:
             self._append("center_angle", self._orbit.angle_of(state))
         membranes = self._dynamics.membranes
         # Between samples: at one, the rate of a stiff state magnifies the noise of the integrator.
-        change, duration = self._dynamics.rate_of(motion), 1.0
         if self._previous:
             change, duration = state - self._previous[1], time - self._previous[0]
+        else:
+            change, duration = self._dynamics.rate_of(motion), 1.0
         self._append("state_rate", state_rate(membranes, change, duration))
         self._previous = time, state
         tangent_angle = membranes.tangent_angle(state)

@@ -35,9 +35,11 @@ class Motion:
 
     velocity : (2, M, N); turning : n · u_s, (M, N); tension : (M, N)
     bending, adhesion : force densities (2, M, N)
+    closeness : None for a single vesicle; adhesion : None for a scene without
     """
 
     geometry: Geometry
+    closeness: Closeness | None
     velocity: Array
     turning: Array
     tension: Array
@@ -90,7 +92,7 @@ class Dynamics:
         if self.flow:
             velocity += self.flow.velocity(geometry)
         free = self.inextensibility.solve(self.layer, geometry, velocity)
-        return Motion(geometry, free.velocity, free.turning, free.tension, bending, adhesion)
+        return Motion(geometry, closeness, free.velocity, free.turning, free.tension, bending, adhesion)
 
     def rate(self, state: Array) -> Array:
         """d(state)/dt.
@@ -116,8 +118,8 @@ class Dynamics:
         geometry = motion.geometry
         force_x, force_y = self.bending.jacobian(geometry)
         self._add_tension_turning(motion, force_x, force_y)
-        if self.adhesion:
-            adhesion_x, adhesion_y = self.adhesion.jacobian(geometry, Closeness(geometry))
+        if self.adhesion and motion.closeness:
+            adhesion_x, adhesion_y = self.adhesion.jacobian(geometry, motion.closeness)
             force_x += adhesion_x
             force_y += adhesion_y
         weights = np.repeat(self.membranes.spacing, self.membranes.points)[:, None]

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from solver import Outcome, Run, Scene
-from solver.curve import area, positions
+from solver.curve import area, positions, tangents
 from solver.scene import Adhesion, Extension, Numerics, Output, Shear, Start, Trap, Vesicle
 from solver.simulate import Cancelled, simulate
 from tests.solver.scenes import fixed_horizon, shear_pair, uneven_pair
@@ -58,7 +58,7 @@ def test_the_area_error_falls_at_the_order_of_the_integrator() -> None:
     assert np.all(errors < 5 * tolerances)
     for run in runs:
         ends = run.frames.tangent_angle[-1]
-        true = np.abs(area(frame_points(run)[-1], ends, 2 * np.pi) / (0.9 * np.pi) - 1).max()
+        true = np.abs(area(frame_points(run)[-1], tangents(ends), 2 * np.pi) / (0.9 * np.pi) - 1).max()
         assert true == pytest.approx(run.series["area_error"][-1], rel=1e-6, abs=1e-14)
 
 
