@@ -46,10 +46,11 @@ class Adhesion:
 
     def jacobian(self, geometry: Geometry, closeness: Closeness) -> tuple[Array, Array]:
         """Derivatives of both components by the state, (M·N, state) each."""
-        size = geometry.membranes.count * geometry.membranes.points
-        hessian = np.empty((3, size, size))
+        membranes = geometry.membranes
+        size = membranes.count * membranes.points
+        hessian = np.empty((3, size, membranes.copies * size))
         adhesion_hessians(*self._arguments(geometry, closeness), hessian)
-        xx, xy, yy = hessian
+        xx, xy, yy = membranes.fold(hessian)
         return geometry.by_state(xx, xy), geometry.by_state(xy, yy)
 
     def _arguments(self, geometry: Geometry, closeness: Closeness) -> tuple[Any, ...]:
@@ -58,8 +59,9 @@ class Adhesion:
 
     def _sums(self, geometry: Geometry, closeness: Closeness) -> tuple[Any, ...]:
         refinement = closeness.refinement(self._ratio)
-        return geometry.points, geometry.membranes.spacing, refinement, *self._potential
+        return geometry.curve_points, geometry.membranes.curve_spacing, refinement, *self._potential
 
     def energy(self, geometry: Geometry, closeness: Closeness) -> float:
         """∫∫ φ ds ds summed over all pairs."""
-        return float(self._hamaker * adhesion_energies(*self._sums(geometry, closeness)))
+        energy = adhesion_energies(*self._sums(geometry, closeness))
+        return float(geometry.membranes.copies * self._hamaker * energy)

@@ -112,14 +112,13 @@ def adhesion_hessian(
 def adhesion_energies(
     points: Array, spacing: Array, refinement: Refinement, distance: float, m: int, n: int
 ) -> float:
-    """∫∫ (δ/r)^m − (m/n)(δ/r)^n ds ds summed over all pairs of vesicles."""
+    """∫∫ (δ/r)^m − (m/n)(δ/r)^n ds ds, half the sum over all vesicles and all other curves."""
     total = 0.0
     for g in range(refinement.groups.shape[0]):
         target, source, factor = refinement.groups[g]
         rows = refinement.rows[refinement.starts[g] : refinement.starts[g + 1]]
         fine = refined_points(points, source, factor, refinement)
         pair = adhesion_energy(points[:, target][:, rows], fine, distance, m, n)
-        # Every pair comes twice, once from either side.
         total += 0.5 * spacing[target] * spacing[source] / factor * pair
     return total
 
@@ -159,7 +158,7 @@ def adhesion_hessians(
     strength: float,
     hessian: Array,
 ) -> None:
-    """Fill the components (3, M·N, M·N) of the derivative of `adhesion_density` by the points."""
+    """Fill the components (3, M·N, C·N) of the derivative of `adhesion_density` by all curves' points."""
     size = points.shape[2]
     hessian[:] = 0.0
     for g in range(refinement.groups.shape[0]):

@@ -40,4 +40,4 @@ class Bending:
         """½κ∫curvature² ds over all membranes."""
         curvature_vector = geometry.arclength_derivative(geometry.tangents)
         square = np.sum(curvature_vector**2, axis=(0, 2)) * geometry.membranes.spacing
-        return float(0.5 * np.sum(geometry.membranes.bending_modulus * square))
+        return float(0.5 * geometry.membranes.copies * np.sum(geometry.membranes.bending_modulus * square))

@@ -258,9 +258,9 @@ def close_single_layer(
     xy: Array,
     yy: Array,
 ) -> None:
-    """Replace the rows (·, M·n) of targets too close for `refinement.refine_single_layer`.
+    """Replace the rows (·, C·n) of targets too close for `refinement.refine_single_layer`.
 
-    points, tangents : (2, M, n); spacing : (M,); the rest as in `close_stokeslets`
+    points, tangents : (2, C, n); spacing : (C,); the rest as in `close_stokeslets`
     """
     n = points.shape[2]
     for g in range(refinement.groups.shape[0]):

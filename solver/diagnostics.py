@@ -15,6 +15,7 @@ from solver.proximity import gap
 from solver.rheology import adhesion_stress, membrane_stress
 from solver.run import Frames, Series
 from solver.spectral import tail
+from solver.symmetry import independent_vesicles
 
 Array = NDArray[np.float64]
 Measure = Callable[[Motion], float]
@@ -37,14 +38,15 @@ def state_rate(membranes: Membranes, change: Array, duration: float) -> float:
 
     Zero when shapes and arrangement stay: the points glide (`gliding`), so treading does not count.
     """
-    turning, moving = membranes.tangent_angle(change), membranes.center(change)
+    turning, moving = membranes.tangent_angle(change), membranes.curve_center(change)
     relative = moving - moving.mean(axis=0)
     return float(max(np.abs(turning).max(), np.abs(relative).max()) / duration)
 
 
 def measures(setting: scene.Scene, dynamics: Dynamics) -> dict[str, Measure]:
     """The diagnostics that a scene has, by the name of their series."""
-    target_area = np.array([v.reduced_area * v.length**2 / (4 * np.pi) for v in setting.vesicles])
+    vesicles = independent_vesicles(setting)
+    target_area = np.array([v.reduced_area * v.length**2 / (4 * np.pi) for v in vesicles])
 
     found: dict[str, Measure] = {
         "bending_energy": lambda motion: dynamics.bending.energy(motion.geometry),
@@ -64,7 +66,7 @@ def measures(setting: scene.Scene, dynamics: Dynamics) -> dict[str, Measure]:
     else:
         found["inclination_angle"] = lambda motion: float(curve.inclination(motion.geometry.points[:, 0]))
     if isinstance(setting.flow, scene.Shear) and setting.flow.rate > 0:
-        scale = 1 / (setting.flow.rate * target_area.sum())
+        scale = 1 / (setting.flow.rate * dynamics.membranes.copies * target_area.sum())
         found["viscosity_bending_tension"] = lambda motion: scale * membrane_stress(motion)
         if adhesion:
             found["viscosity_adhesion"] = lambda motion: scale * adhesion_stress(motion)
@@ -116,7 +118,10 @@ class Recorder:
 
     def _keep(self, time: float, state: Array, motion: Motion) -> None:
         membranes = self._dynamics.membranes
-        self._frames.append((time, membranes.tangent_angle(state), membranes.center(state), motion.tension))
+        tension = np.tile(motion.tension, (membranes.copies, 1))
+        self._frames.append(
+            (time, membranes.curve_tangent_angle(state), membranes.curve_center(state), tension)
+        )
 
     def _append(self, name: str, value: float) -> None:
         self.values.setdefault(name, []).append(value)

@@ -19,7 +19,7 @@ from solver.adhesion import Adhesion
 from solver.bending import Bending
 from solver.flow import ImposedFlow, imposed_flow
 from solver.geometry import Geometry, Membranes
-from solver.gliding import glide, gliding_direction, gliding_speed
+from solver.gliding import glide, gliding_direction, gliding_speed, gliding_speed_by_curvature
 from solver.proximity import Closeness
 from solver.scene import Scene
 from solver.spectral import differentiation, highest_modes, integration
@@ -65,15 +65,15 @@ class Dynamics:
     @classmethod
     def of(cls, scene: Scene) -> Self:
         """The terms of a scene."""
-        membranes = Membranes.of(scene.vesicles, scene.numerics.points)
-        several = membranes.count > 1
+        membranes = Membranes.of_scene(scene)
+        several = membranes.curves > 1
         # Of sums and iterations; so far below the time integrator's that they do not limit its step.
         accuracy = float(np.clip(1e-3 * scene.numerics.tolerance, 1e-12, 1e-7))
         return cls(
             membranes=membranes,
             bending=Bending(),
             adhesion=Adhesion(scene.adhesion, accuracy) if scene.adhesion and several else None,
-            flow=imposed_flow(scene.flow) if scene.flow else None,
+            flow=imposed_flow(scene.flow, membranes) if scene.flow else None,
             inextensibility=Inextensibility(accuracy),
             layer=SingleLayer(membranes, accuracy),
         )
@@ -111,8 +111,7 @@ class Dynamics:
     def jacobian(self, state: Array) -> Array:
         """Derivative of `rate`, (state_size, state_size).
 
-        Dropped is only the change of the gliding direction with the curvature, and that of a refined
-        quadrature with the points.
+        Dropped is only the change of a refined quadrature with the points.
         """
         motion = self.motion(state)
         geometry = motion.geometry
@@ -165,7 +164,7 @@ class Dynamics:
 
     def _assemble(self, state: Array) -> tuple[Geometry, Closeness | None]:
         geometry = Geometry(self.membranes, state)
-        closeness = Closeness(geometry) if self.membranes.count > 1 else None
+        closeness = Closeness(geometry) if self.membranes.curves > 1 else None
         self.layer.assemble(geometry, closeness)
         return geometry, closeness
 
@@ -194,12 +193,13 @@ class Dynamics:
         turning -= ty * geometry.column_derivative(ux)
         curvature, highest = geometry.curvature, highest_modes(points)
         direction, gliding = gliding_direction(curvature), gliding_speed(curvature, motion.turning)
+        by_curvature = gliding_speed_by_curvature(curvature, motion.turning)
         for vesicle in range(count):
             block = slice(vesicle * points, (vesicle + 1) * points)
             result[block] += np.outer(curvature[vesicle], direction[vesicle] @ result[block])
-            result[block, block] += (
-                gliding[vesicle] * self.membranes.wavenumber[vesicle] * differentiation(points)
-            )
+            to_curvature = self.membranes.wavenumber[vesicle] * differentiation(points)
+            result[block, block] += gliding[vesicle] * to_curvature
+            result[block, block] += np.outer(curvature[vesicle], by_curvature[vesicle] @ to_curvature)
             result[block] -= highest @ (highest.T @ result[block])
         for component, velocity in enumerate((ux, uy)):
             first = (points + component) * count

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver import scene
-from solver.geometry import Geometry
+from solver.geometry import Geometry, Membranes
 
 Array = NDArray[np.float64]
 
@@ -62,12 +62,12 @@ class TrapFlow:
         return self.linear.jacobian(dx - dx.mean(axis=0), dy - dy.mean(axis=0))
 
 
-def imposed_flow(flow: scene.Shear | scene.Extension | scene.Trap) -> ImposedFlow:
+def imposed_flow(flow: scene.Shear | scene.Extension | scene.Trap, membranes: Membranes) -> ImposedFlow:
     """The flow that a scene asks for."""
     match flow:
         case scene.Shear():
             return LinearFlow(flow.rate * _SHEAR)
-        case scene.Extension():
-            return LinearFlow(flow.rate * _EXTENSION)
-        case scene.Trap():
+        case scene.Trap() if membranes.copies == 1:
             return TrapFlow(flow.rate * _EXTENSION)
+        case scene.Extension() | scene.Trap():  # vesicles and their images have the origin as their mean
+            return LinearFlow(flow.rate * _EXTENSION)

@@ -10,15 +10,19 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.scene import Vesicle
+from solver.scene import Scene, Vesicle
 from solver.spectral import differentiation, integration
+from solver.symmetry import independent_vesicles
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Membranes:
-    """What stays the same during a run: M vesicles with N points each.
+    """What stays the same during a run: M vesicles with N points each, and perhaps their images.
+
+    With ``copies`` = 2 every vesicle has an image (`symmetry`).  The C = copies·M curves in the fluid are
+    the vesicles and then the images, in the same order.
 
     length, bending_modulus : (M,)
     """
@@ -26,15 +30,23 @@ class Membranes:
     points: int
     length: Array
     bending_modulus: Array
+    copies: int = 1
 
     @classmethod
-    def of(cls, vesicles: Sequence[Vesicle], points: int) -> Self:
+    def of(cls, vesicles: Sequence[Vesicle], points: int, copies: int = 1) -> Self:
         """The membranes of these vesicles, sampled at ``points`` points each."""
         return cls(
             points,
             np.array([vesicle.length for vesicle in vesicles]),
             np.array([vesicle.bending_modulus for vesicle in vesicles]),
+            copies,
         )
+
+    @classmethod
+    def of_scene(cls, scene: Scene) -> Self:
+        """The membranes that have to be computed for a scene."""
+        vesicles = independent_vesicles(scene)
+        return cls.of(vesicles, scene.numerics.points, len(scene.vesicles) // len(vesicles))
 
     @property
     def count(self) -> int:
@@ -42,9 +54,19 @@ class Membranes:
         return len(self.length)
 
     @property
+    def curves(self) -> int:
+        """Number of vesicles and images."""
+        return self.copies * self.count
+
+    @property
     def spacing(self) -> Array:
         """Arclength between neighboring points, (M,)."""
         return self.length / self.points
+
+    @property
+    def curve_spacing(self) -> Array:
+        """`spacing` of all curves, (C,)."""
+        return np.tile(self.spacing, self.copies)
 
     @cached_property
     def wavenumber(self) -> Array:
@@ -75,6 +97,27 @@ class Membranes:
         size = self.count * self.points
         return state[..., size:].reshape(*state.shape[:-1], 2, self.count).swapaxes(-1, -2)
 
+    def curve_tangent_angle(self, state: Array) -> Array:
+        """Tangent angles of all curves, (..., C, N)."""
+        angle = self.tangent_angle(state)
+        return np.concatenate([angle, angle + np.pi], axis=-2) if self.copies == 2 else angle
+
+    def curve_center(self, state: Array) -> Array:
+        """Centers of all curves, (..., C, 2)."""
+        return self.with_images(self.center(state), axis=-2)
+
+    def with_images(self, vectors: Array, axis: int) -> Array:
+        """Vectors on the vesicles, and the opposite ones on the images, along the axis of the vesicles."""
+        return np.concatenate([vectors, -vectors], axis=axis) if self.copies == 2 else vectors
+
+    def fold(self, columns: Array) -> Array:
+        """Linear operators (..., M·N) that act on vesicles alone, from those on all curves (..., C·N).
+
+        What vectors on the images do is opposite to what the same vectors on the vesicles do.
+        """
+        size = self.count * self.points
+        return columns[..., :size] - columns[..., size:] if self.copies == 2 else columns
+
 
 class Geometry:
     """Points and tangents of all membranes in one state.
@@ -82,6 +125,8 @@ class Geometry:
     Attributes
     ----------
     tangents, points : (2, M, N)
+    curve_tangents, curve_points : (2, C, N)
+        With the images.
     """
 
     def __init__(self, membranes: Membranes, state: Array) -> None:
@@ -96,6 +141,8 @@ class Geometry:
         )
         self.points /= membranes.wavenumber
         self.points += self.centers[:, :, None]
+        self.curve_tangents = membranes.with_images(self.tangents, axis=1)
+        self.curve_points = membranes.with_images(self.points, axis=1)
 
     @property
     def normals(self) -> Array:

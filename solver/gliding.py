@@ -28,8 +28,7 @@ def gliding_direction(curvature: Array) -> Array:
     """The linear functional of n · u_s that is the gliding speed, (M, N), for curvatures (M, N)."""
     direction = np.empty_like(curvature)
     for vesicle in range(curvature.shape[0]):
-        mean = curvature[vesicle].mean()
-        weighted = curvature[vesicle] - mean + _CIRCLE_WEIGHT * mean
+        weighted = curvature[vesicle] - (1 - _CIRCLE_WEIGHT) * curvature[vesicle].mean()
         direction[vesicle] = -weighted / np.sum(weighted * curvature[vesicle])
     return direction
 
@@ -38,6 +37,20 @@ def gliding_direction(curvature: Array) -> Array:
 def gliding_speed(curvature: Array, turning: Array) -> Array:
     """Gliding speeds (M,) for curvatures and n · u_s, (M, N) each."""
     return np.sum(gliding_direction(curvature) * turning, axis=1)
+
+
+@compiled
+def gliding_speed_by_curvature(curvature: Array, turning: Array) -> Array:
+    """Derivative (M, N) of each vesicle's `gliding_speed` by its curvature, at fixed n · u_s."""
+    derivative = np.empty_like(curvature)
+    for vesicle in range(curvature.shape[0]):
+        bend, turn = curvature[vesicle], turning[vesicle]
+        weighted = bend - (1 - _CIRCLE_WEIGHT) * bend.mean()
+        weighted_turn = turn - (1 - _CIRCLE_WEIGHT) * turn.mean()
+        square = np.sum(weighted * bend)
+        speed = -np.sum(weighted * turn) / square
+        derivative[vesicle] = -(weighted_turn + 2 * speed * weighted) / square
+    return derivative
 
 
 @compiled

@@ -126,14 +126,14 @@ def complete_self_part(
 
 @compiled
 def stokeslet_derivatives(points: Array, forces: Array, xx: Array, xy: Array, yx: Array, yy: Array) -> None:
-    """Fill the derivatives of the velocity at each of ``points`` (2, n) by all of them, (n, n) each.
+    """Fill the derivatives of the velocity at the first m of ``points`` (2, n) by all of them, (m, n) each.
 
     The velocity is the sum of Stokeslets of strength ``forces`` (2, n) at the points; with r = x − y and
     g = F·r, moving r by δ changes one of them by
     [−F (r·δ) + r (F·δ) + g δ − 2 g r (r·δ)/r²]/(4π r²).  ``xy`` is that of x-velocity by y, and so on.
     """
     scale = 1.0 / (4.0 * np.pi)
-    for i in range(points.shape[1]):
+    for i in range(xx.shape[0]):
         xi, yi = points[0, i], points[1, i]
         for j in range(points.shape[1]):
             dx = xi - points[0, j]
@@ -178,12 +178,12 @@ def distances(targets: Array, sources: Array, tangents: Array, spacing: float, o
 
 @compiled
 def pair_distances(points: Array, tangents: Array, spacing: Array, out: Array) -> None:
-    """`distances` for all ordered pairs: out[a, b, i] is that of point i of vesicle a to vesicle b.
+    """`distances` for all ordered pairs: out[a, b, i] is that of point i of vesicle a to curve b.
 
-    points, tangents : (2, M, N); spacing : (M,); out : (M, M, N), its diagonal left alone
+    points, tangents : (2, C, N); spacing : (C,); out : (M, C, N), its diagonal left alone
     """
-    for target in range(points.shape[1]):
-        for source in range(points.shape[1]):
+    for target in range(out.shape[0]):
+        for source in range(out.shape[1]):
             if target != source:
                 distances(
                     points[:, target],

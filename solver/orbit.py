@@ -67,7 +67,7 @@ class Orbit:
         return self.half_turns[-1] - self.half_turns[-3] if len(self.half_turns) > 2 else None
 
     def _offset(self, state: Array) -> Array:
-        first, second = self._membranes.center(state)
+        first, second = self._membranes.curve_center(state)
         return np.asarray(second - first)
 
     def _excess_turn(self, state: Array) -> float:

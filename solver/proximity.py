@@ -18,16 +18,17 @@ class Closeness:
 
     Attributes
     ----------
-    distances : (M, M, N)
+    distances : (M, C, N)
         Distance over the source's spacing, by target, source and point of the target.
     """
 
     def __init__(self, geometry: Geometry) -> None:
         membranes = geometry.membranes
         self._points = membranes.points
-        self.distances = np.full((membranes.count, membranes.count, membranes.points), np.inf)
-        pair_distances(geometry.points, geometry.tangents, membranes.spacing, self.distances)
-        self.distances /= membranes.spacing[:, None]
+        spacing = membranes.curve_spacing
+        self.distances = np.full((membranes.count, membranes.curves, membranes.points), np.inf)
+        pair_distances(geometry.curve_points, geometry.curve_tangents, spacing, self.distances)
+        self.distances /= spacing[:, None]
         self._nearest = float(self.distances.min())
 
     def refinement(self, ratio: float) -> Refinement:
@@ -43,8 +44,11 @@ def gap(geometry: Geometry, refinement: int = 4) -> float:
     """Smallest distance between two different membranes, seen at ``refinement`` times as many points."""
     membranes = geometry.membranes
     matrix = interpolation(membranes.points, refinement).T
-    distance = np.full((membranes.count, membranes.count, refinement * membranes.points), np.inf)
+    distance = np.full((membranes.count, membranes.curves, refinement * membranes.points), np.inf)
     pair_distances(
-        geometry.points @ matrix, geometry.tangents @ matrix, membranes.spacing / refinement, distance
+        geometry.curve_points @ matrix,
+        geometry.curve_tangents @ matrix,
+        membranes.curve_spacing / refinement,
+        distance,
     )
     return float(distance.min())

@@ -24,8 +24,8 @@ class Refinement(NamedTuple):
     """Which targets see which vesicle at which factor.
 
     groups : (k, 3)
-        Target vesicle, source vesicle and factor of each group of targets; every target is in exactly one
-        group of every other vesicle.
+        Target vesicle, source curve and factor of each group of targets; every target is in exactly one
+        group of every other curve.
     rows, starts : (·,), (k + 1,)
         ``rows[starts[g]:starts[g + 1]]`` are the points of group g within their vesicle.
     interpolations : (·, n)
@@ -52,16 +52,16 @@ def refinement_factors(distance_per_spacing: Array, ratio: float) -> Indices:
 def group_targets(distances: Array, ratio: float) -> tuple[Indices, Indices, Indices]:
     """Make the groups, rows and starts of `Refinement`.
 
-    distances : (M, M, n)
-        Distance over spacing, by target vesicle, source vesicle and point of the target.
+    distances : (M, C, n)
+        Distance over spacing, by target vesicle, source curve and point of the target.
     """
-    count, n = distances.shape[0], distances.shape[2]
+    count, curves, n = distances.shape
     groups = [(0, 0, 0)][:0]
-    rows = np.empty(count * (count - 1) * n, dtype=np.int64)
+    rows = np.empty(count * (curves - 1) * n, dtype=np.int64)
     starts = [0]
     used = 0
     for target in range(count):
-        for source in range(count):
+        for source in range(curves):
             if target == source:
                 continue
             factors = refinement_factors(distances[target, source], ratio)
@@ -89,14 +89,14 @@ def interpolation_to(refinement: Refinement, factor: int) -> Array:
 
 @compiled
 def refined_points(points: Array, source: int, factor: int, refinement: Refinement) -> Array:
-    """Points (2, factor·n) of one of the vesicles ``points`` (2, M, n)."""
+    """Points (2, factor·n) of one of the curves ``points`` (2, C, n)."""
     coarse = np.ascontiguousarray(points[:, source])
     return coarse if factor == 1 else np.dot(coarse, interpolation_to(refinement, factor).T)
 
 
 @compiled
 def refine_single_layer(points: Array, refinement: Refinement, xx: Array, xy: Array, yy: Array) -> None:
-    """Replace the rows (·, M·n) of targets that need a factor of 2 or 4, folding refined columns back.
+    """Replace the rows (·, C·n) of targets that need a factor of 2 or 4, folding refined columns back.
 
     For closer ones `close_evaluation` costs less.
     """

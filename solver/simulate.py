@@ -139,8 +139,10 @@ def _start(scene: Scene, dynamics: Dynamics, should_stop: Callable[[], bool] | N
     if relaxed.outcome is not Outcome.EQUILIBRIUM:
         reason = relaxed.failure or f"{relaxed.outcome} at time {relaxed.time:g}"
         return _Start(placed, relaxed.work.rhs_evaluations, f"start: the pair did not relax ({reason})")
-    last = dynamics.membranes.pack(relaxed.frames.tangent_angle[-1], relaxed.frames.center[-1])
-    turned = turned_state(dynamics.membranes, last, scene.start.tilt)
+    membranes, frames = dynamics.membranes, relaxed.frames
+    computed = slice(membranes.count)  # the others are images
+    last = membranes.pack(frames.tangent_angle[-1, computed], frames.center[-1, computed])
+    turned = turned_state(membranes, last, scene.start.tilt)
     return _Start(turned, relaxed.work.rhs_evaluations)
 
 

@@ -27,7 +27,7 @@ class SingleLayer:
     """Discrete single-layer potential, kept as its three components.
 
     The components act on point forces, that is force densities times the spacing, and are then symmetric
-    up to quadrature error.
+    up to quadrature error.  Images (`symmetry`) carry the opposite forces.
 
     Parameters
     ----------
@@ -44,18 +44,20 @@ class SingleLayer:
     def __init__(self, membranes: Membranes, accuracy: float) -> None:
         self._ratio = required_ratio(1.0, accuracy)
         points = membranes.points
-        size = membranes.count * points
-        self.xx, self.xy, self.yy = np.zeros((3, size, size))
+        self._of_curves = np.zeros((3, membranes.count * points, membranes.curves * points))
+        self.xx, self.xy, self.yy = self._of_curves
         self._correction = logarithm_correction(points)
         self._diagonal = self._correction[0, 0] - np.log(membranes.length / (2 * np.pi)) / (4 * np.pi)
 
     def assemble(self, geometry: Geometry, closeness: Closeness | None) -> None:
         """Fill the components for this geometry; ``closeness`` is None for a single vesicle."""
-        count, points = geometry.membranes.count, geometry.membranes.points
-        all_points = geometry.points.reshape(2, -1)
-        components = self.xx, self.xy, self.yy
-        kernels.stokeslets(all_points, all_points, *components)
-        for vesicle in range(count):
+        membranes = geometry.membranes
+        points = membranes.points
+        components = tuple(self._of_curves)
+        kernels.stokeslets(
+            geometry.points.reshape(2, -1), geometry.curve_points.reshape(2, -1), *components
+        )
+        for vesicle in range(membranes.count):
             kernels.complete_self_part(
                 self._correction,
                 self._diagonal[vesicle],
@@ -66,17 +68,18 @@ class SingleLayer:
         if closeness is None:
             return
         refinement = closeness.refinement(self._ratio)
-        refine_single_layer(geometry.points, refinement, *components)
+        refine_single_layer(geometry.curve_points, refinement, *components)
         if refinement.groups[:, 2].max() > LARGEST_REFINED:
             close_single_layer(
-                geometry.points,
-                geometry.tangents,
-                geometry.membranes.spacing,
+                geometry.curve_points,
+                geometry.curve_tangents,
+                membranes.curve_spacing,
                 refinement,
                 self._correction,
                 differentiation(points),
                 *components,
             )
+        self.xx, self.xy, self.yy = membranes.fold(self._of_curves)
 
     def velocity(self, point_forces: Array) -> Array:
         """Velocity (2, M, N) that point forces (2, M, N) cause at the membranes' points."""
@@ -93,11 +96,14 @@ class SingleLayer:
 
         Sources that are refined for close targets are differentiated as if they were not.
         """
-        size = geometry.membranes.count * geometry.membranes.points
-        xx, xy, yx, yy = np.empty((4, size, size))
-        forces = point_forces.reshape(2, -1)
-        kernels.stokeslet_derivatives(geometry.points.reshape(2, -1), forces, xx, xy, yx, yy)
+        membranes = geometry.membranes
+        size = membranes.count * membranes.points
+        derivatives = np.empty((4, size, membranes.copies * size))
+        curve_forces = membranes.with_images(point_forces, axis=1).reshape(2, -1)
+        kernels.stokeslet_derivatives(geometry.curve_points.reshape(2, -1), curve_forces, *derivatives)
+        xx, xy, yx, yy = membranes.fold(derivatives)
         by_x, by_y = geometry.by_state(xx, xy), geometry.by_state(yx, yy)
+        forces = point_forces.reshape(2, -1)
         # On the diagonal r⊗r/r² is t⊗t, which turns with the tangent.
         tangents, normals = geometry.tangents.reshape(2, -1), geometry.normals.reshape(2, -1)
         along, across = np.sum(tangents * forces, axis=0), np.sum(normals * forces, axis=0)
