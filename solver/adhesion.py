@@ -44,14 +44,13 @@ class Adhesion:
         adhesion_density(*self._arguments(geometry, closeness), density)
         return density
 
-    def jacobian(self, geometry: Geometry, closeness: Closeness) -> tuple[Array, Array]:
-        """Derivatives of both components by the state, (M·N, state) each."""
+    def jacobian(self, geometry: Geometry, closeness: Closeness) -> Array:
+        """Derivative of `density` by the state, (2, M·N, state)."""
         membranes = geometry.membranes
         size = membranes.count * membranes.points
-        hessian = np.empty((3, size, membranes.copies * size))
+        hessian = np.empty((2, size, 2, membranes.copies * size))
         adhesion_hessians(*self._arguments(geometry, closeness), hessian)
-        xx, xy, yy = membranes.fold(hessian)
-        return geometry.by_state(xx, xy), geometry.by_state(xy, yy)
+        return geometry.by_state(membranes.fold(hessian))
 
     def _arguments(self, geometry: Geometry, closeness: Closeness) -> tuple[Any, ...]:
         """What the compiled sums of forces over all pairs are given."""

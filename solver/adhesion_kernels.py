@@ -158,7 +158,7 @@ def adhesion_hessians(
     strength: float,
     hessian: Array,
 ) -> None:
-    """Fill the components (3, M·N, C·N) of the derivative of `adhesion_density` by all curves' points."""
+    """Fill the derivative (2, M·N, 2, C·N) of `adhesion_density` by all curves' points."""
     size = points.shape[2]
     hessian[:] = 0.0
     for g in range(refinement.groups.shape[0]):
@@ -170,10 +170,11 @@ def adhesion_hessians(
         targets = points[:, target][:, rows]
         adhesion_hessian(targets, fine, distance, m, n, scale, pair[0], pair[1], pair[2])
         first, last = source * size, (source + 1) * size
-        for component in range(3):
+        for component, (a, b) in enumerate(((0, 0), (0, 1), (1, 1))):
             each = pair[component]
             folded = each if factor == 1 else np.dot(each, interpolation_to(refinement, factor))
             for k in range(rows.size):
                 row = target * size + rows[k]
-                hessian[component, row, first:last] = -folded[k]
-                hessian[component, row, row] += each[k].sum()
+                hessian[a, row, b, first:last] = -folded[k]
+                hessian[a, row, b, row] += each[k].sum()
+    hessian[1, :, 0] = hessian[0, :, 1]

@@ -75,10 +75,11 @@ def logarithm(x: float) -> float:
 
 
 @compiled
-def stokeslets(targets: Array, sources: Array, xx: Array, xy: Array, yy: Array) -> None:
-    """Fill the components (m, n) of (−log r I + r⊗r/r²)/4π from ``sources`` (2, n) to ``targets`` (2, m).
+def stokeslets(targets: Array, sources: Array, components: Array) -> None:
+    """Fill the components xx, xy, yy (3, m, n) of (−log r I + r⊗r/r²)/4π between points.
 
-    Where a target is its own source the entries are meaningless and the caller's to overwrite.
+    ``targets`` are (2, m), ``sources`` (2, n).  Where a target is its own source the entries are meaningless
+    and the caller's to overwrite.
     """
     scale = 1.0 / (4.0 * np.pi)
     for i in range(targets.shape[1]):
@@ -89,51 +90,67 @@ def stokeslets(targets: Array, sources: Array, xx: Array, xy: Array, yy: Array) 
             r2 = dx * dx + dy * dy
             inverse = scale / r2
             isotropic = -0.5 * scale * logarithm(r2)
-            xx[i, j] = isotropic + dx * dx * inverse
-            xy[i, j] = dx * dy * inverse
-            yy[i, j] = isotropic + dy * dy * inverse
+            components[0, i, j] = isotropic + dx * dx * inverse
+            components[1, i, j] = dx * dy * inverse
+            components[2, i, j] = isotropic + dy * dy * inverse
 
 
 @compiled
-def complete_self_part(
-    correction: Array, diagonal: float, tangents: Array, first: int, xx: Array, xy: Array, yy: Array
-) -> None:
-    """Turn point Stokeslets of one closed curve on itself into its single-layer quadrature.
+def complete_self_parts(correction: Array, diagonal: Array, tangents: Array, components: Array) -> None:
+    """Turn point Stokeslets of closed curves on themselves into their single-layer quadrature.
 
     Parameters
     ----------
     correction : (n, n)
         What Kress's rule adds off the diagonal (`close_evaluation.logarithm_correction`).
-    diagonal : float
+    diagonal : (M,)
         The whole logarithmic part on the diagonal, over 4π.
-    tangents : (2, n)
-    first : int
-        Where the curve's rows and columns begin in the components.
+    tangents : (2, M, n)
+    components : (3, M·n, ·)
+        Of `stokeslets`; the sources begin with the targets.
     """
     scale = 1.0 / (4.0 * np.pi)
-    n = tangents.shape[1]
-    for i in range(n):
-        row = first + i
-        for j in range(n):
-            xx[row, first + j] += correction[i, j]
-        for j in range(n):
-            yy[row, first + j] += correction[i, j]
-        tx, ty = tangents[0, i], tangents[1, i]
-        xx[row, row] = diagonal + scale * tx * tx
-        xy[row, row] = scale * tx * ty
-        yy[row, row] = diagonal + scale * ty * ty
+    n = tangents.shape[2]
+    for vesicle in range(tangents.shape[1]):
+        first = vesicle * n
+        for i in range(n):
+            row = first + i
+            for j in range(n):
+                components[0, row, first + j] += correction[i, j]
+            for j in range(n):
+                components[2, row, first + j] += correction[i, j]
+            tx, ty = tangents[0, vesicle, i], tangents[1, vesicle, i]
+            components[0, row, row] = diagonal[vesicle] + scale * tx * tx
+            components[1, row, row] = scale * tx * ty
+            components[2, row, row] = diagonal[vesicle] + scale * ty * ty
 
 
 @compiled
-def stokeslet_derivatives(points: Array, forces: Array, xx: Array, xy: Array, yx: Array, yy: Array) -> None:
-    """Fill the derivatives of the velocity at the first m of ``points`` (2, n) by all of them, (m, n) each.
+def join_components(components: Array, matrix: Array) -> None:
+    """Write the components (3, m, n) into one matrix (2m, 2m).
+
+    Columns beyond m belong to images, on which forces are opposite.
+    """
+    m = components.shape[1]
+    for block, component in ((0, 0), (1, 1), (2, 1), (3, 2)):
+        row, column = block // 2 * m, block % 2 * m
+        for i in range(m):
+            for j in range(m):
+                matrix[row + i, column + j] = components[component, i, j]
+            for image in range(m, components.shape[2]):
+                matrix[row + i, column + image - m] -= components[component, i, image]
+
+
+@compiled
+def stokeslet_derivatives(points: Array, forces: Array, by_points: Array) -> None:
+    """Fill the derivatives (2, m, 2, n) of the velocity at the first m of ``points`` (2, n) by all of them.
 
     The velocity is the sum of Stokeslets of strength ``forces`` (2, n) at the points; with r = x − y and
     g = F·r, moving r by δ changes one of them by
-    [−F (r·δ) + r (F·δ) + g δ − 2 g r (r·δ)/r²]/(4π r²).  ``xy`` is that of x-velocity by y, and so on.
+    [−F (r·δ) + r (F·δ) + g δ − 2 g r (r·δ)/r²]/(4π r²).
     """
     scale = 1.0 / (4.0 * np.pi)
-    for i in range(xx.shape[0]):
+    for i in range(by_points.shape[1]):
         xi, yi = points[0, i], points[1, i]
         for j in range(points.shape[1]):
             dx = xi - points[0, j]
@@ -143,14 +160,13 @@ def stokeslet_derivatives(points: Array, forces: Array, xx: Array, xy: Array, yx
             inverse = scale / (r2 if r2 > 0.0 else np.inf)
             along = dx * fx + dy * fy
             pull = 2.0 * along * inverse * inverse * (1.0 / scale)
-            xx[i, j] = -along * inverse + pull * dx * dx
-            xy[i, j] = (fx * dy - dx * fy) * inverse + pull * dx * dy
-            yx[i, j] = (fy * dx - dy * fx) * inverse + pull * dx * dy
-            yy[i, j] = -along * inverse + pull * dy * dy
-        xx[i, i] = -(xx[i].sum() - xx[i, i])
-        xy[i, i] = -(xy[i].sum() - xy[i, i])
-        yx[i, i] = -(yx[i].sum() - yx[i, i])
-        yy[i, i] = -(yy[i].sum() - yy[i, i])
+            by_points[0, i, 0, j] = -along * inverse + pull * dx * dx
+            by_points[0, i, 1, j] = (fx * dy - dx * fy) * inverse + pull * dx * dy
+            by_points[1, i, 0, j] = (fy * dx - dy * fx) * inverse + pull * dx * dy
+            by_points[1, i, 1, j] = -along * inverse + pull * dy * dy
+        for component in range(2):
+            for coordinate in range(2):
+                by_points[component, i, coordinate, i] -= by_points[component, i, coordinate].sum()
 
 
 @compiled
@@ -177,13 +193,14 @@ def distances(targets: Array, sources: Array, tangents: Array, spacing: float, o
 
 
 @compiled
-def pair_distances(points: Array, tangents: Array, spacing: Array, out: Array) -> None:
-    """`distances` for all ordered pairs: out[a, b, i] is that of point i of vesicle a to curve b.
+def pair_distances(points: Array, tangents: Array, spacing: Array, count: int) -> Array:
+    """`distances` for all ordered pairs: [a, b, i] is that of point i of curve a < ``count`` to curve b.
 
-    points, tangents : (2, C, N); spacing : (C,); out : (M, C, N), its diagonal left alone
+    points, tangents : (2, C, N); spacing : (C,); returns (count, C, N), infinite from a curve to itself
     """
-    for target in range(out.shape[0]):
-        for source in range(out.shape[1]):
+    out = np.full((count, points.shape[1], points.shape[2]), np.inf)
+    for target in range(count):
+        for source in range(points.shape[1]):
             if target != source:
                 distances(
                     points[:, target],
@@ -192,3 +209,4 @@ def pair_distances(points: Array, tangents: Array, spacing: Array, out: Array) -
                     spacing[source],
                     out[target, source],
                 )
+    return out

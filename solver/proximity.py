@@ -26,8 +26,9 @@ class Closeness:
         membranes = geometry.membranes
         self._points = membranes.points
         spacing = membranes.curve_spacing
-        self.distances = np.full((membranes.count, membranes.curves, membranes.points), np.inf)
-        pair_distances(geometry.curve_points, geometry.curve_tangents, spacing, self.distances)
+        self.distances = pair_distances(
+            geometry.curve_points, geometry.curve_tangents, spacing, membranes.count
+        )
         self.distances /= spacing[:, None]
         self._nearest = float(self.distances.min())
 
@@ -44,11 +45,10 @@ def gap(geometry: Geometry, refinement: int = 4) -> float:
     """Smallest distance between two different membranes, seen at ``refinement`` times as many points."""
     membranes = geometry.membranes
     matrix = interpolation(membranes.points, refinement).T
-    distance = np.full((membranes.count, membranes.curves, refinement * membranes.points), np.inf)
-    pair_distances(
+    distances = pair_distances(
         geometry.curve_points @ matrix,
         geometry.curve_tangents @ matrix,
         membranes.curve_spacing / refinement,
-        distance,
+        membranes.count,
     )
-    return float(distance.min())
+    return float(distances.min())

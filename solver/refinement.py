@@ -95,10 +95,10 @@ def refined_points(points: Array, source: int, factor: int, refinement: Refineme
 
 
 @compiled
-def refine_single_layer(points: Array, refinement: Refinement, xx: Array, xy: Array, yy: Array) -> None:
-    """Replace the rows (·, C·n) of targets that need a factor of 2 or 4, folding refined columns back.
+def refine_single_layer(points: Array, refinement: Refinement, components: Array) -> None:
+    """Replace the rows of components (3, ·, C·n) for targets that need a factor of 2 or 4.
 
-    For closer ones `close_evaluation` costs less.
+    Refined columns are folded back.  For closer targets `close_evaluation` costs less.
     """
     n = points.shape[2]
     for g in range(refinement.groups.shape[0]):
@@ -107,14 +107,10 @@ def refine_single_layer(points: Array, refinement: Refinement, xx: Array, xy: Ar
             continue
         rows = refinement.rows[refinement.starts[g] : refinement.starts[g + 1]]
         fine = refined_points(points, source, factor, refinement)
-        shape = (rows.size, fine.shape[1])
-        fine_xx, fine_xy, fine_yy = np.empty(shape), np.empty(shape), np.empty(shape)
-        stokeslets(points[:, target][:, rows], fine, fine_xx, fine_xy, fine_yy)
-        fold = interpolation_to(refinement, factor)
-        folded_xx, folded_xy, folded_yy = np.dot(fine_xx, fold), np.dot(fine_xy, fold), np.dot(fine_yy, fold)
-        first, last = source * n, (source + 1) * n
-        for k in range(rows.size):
-            row = target * n + rows[k]
-            xx[row, first:last] = folded_xx[k] / factor
-            xy[row, first:last] = folded_xy[k] / factor
-            yy[row, first:last] = folded_yy[k] / factor
+        refined = np.empty((3, rows.size, fine.shape[1]))
+        stokeslets(points[:, target][:, rows], fine, refined)
+        for component in range(3):
+            folded = np.dot(refined[component], interpolation_to(refinement, factor))
+            for k in range(rows.size):
+                row = target * n + rows[k]
+                components[component, row, source * n : (source + 1) * n] = folded[k] / factor
