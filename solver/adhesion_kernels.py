@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.kernels import compiled
+from solver.compilation import compiled
 from solver.refinement import Refinement, interpolation_to, refined_points
 
 Array = NDArray[np.float64]

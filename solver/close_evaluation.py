@@ -23,7 +23,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.kernels import compiled, logarithm
+from solver.compilation import compiled
+from solver.logarithm import logarithm
 from solver.refinement import LARGEST_REFINED, Refinement
 from solver.spectral import logarithm_weights
 

@@ -180,7 +180,7 @@ class Dynamics:
         result = np.empty((self.membranes.state_size, velocity.shape[2]))
         gradient = geometry.column_derivative(velocity)
         gradient *= geometry.normals.reshape(2, -1, 1)
-        np.add(*gradient, out=result[: count * points])
+        np.sum(gradient, axis=0, out=result[: count * points])
         curvature, highest = geometry.curvature, highest_modes(points)
         direction, gliding = gliding_direction(curvature), gliding_speed(curvature, motion.turning)
         by_curvature = gliding_speed_by_curvature(curvature, motion.turning)

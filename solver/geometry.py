@@ -10,7 +10,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.kernels import compiled
+from solver.compilation import compiled
 from solver.scene import Scene, Vesicle
 from solver.spectral import differentiation, integration
 from solver.symmetry import independent_vesicles

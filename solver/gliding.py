@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.kernels import compiled
+from solver.compilation import compiled
 
 Array = NDArray[np.float64]
 

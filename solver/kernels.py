@@ -1,77 +1,15 @@
-"""Pairwise sums over membrane points, compiled.
-
-Every function here is a plain double loop whose inner loop LLVM turns into SIMD code.  That needs two
-things: ``error_model="numpy"`` (no branch for a division by zero) and a logarithm without a call, computed
-from the number's bits.
-"""
+"""Sums over pairs of membrane points, compiled."""
 
 from __future__ import annotations
 
-from functools import partial
-from typing import Any
-
 import numpy as np
-from llvmlite import ir
-from numba import njit, types
-from numba.extending import intrinsic
 from numpy.typing import NDArray
+
+from solver.compilation import compiled, widest_vectors
+from solver.logarithm import LOGARITHM_UNIT, logarithm_and_reciprocal
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
-
-# Without "ninf" and "nnan": a run that diverges must show it.
-compiled = partial(
-    njit, cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz", "arcp"}
-)
-
-
-@intrinsic
-def _bits_of(typing_context: Any, value: Any) -> Any:
-    """The 64 bits of a double, as an integer."""
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return builder.bitcast(arguments[0], ir.IntType(64))
-
-    return types.int64(types.float64), generate
-
-
-@intrinsic
-def _double_of(typing_context: Any, bits: Any) -> Any:
-    """The double with these 64 bits."""
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return builder.bitcast(arguments[0], ir.DoubleType())
-
-    return types.float64(types.int64), generate
-
-
-_LN2 = float(np.log(2.0))
-_MANTISSA = (1 << 52) - 1
-_SQRT_HALF_BITS = 0x3FE6A09E667F3BCD
-
-
-@compiled(inline="always")
-def logarithm(x: float) -> float:
-    """Natural logarithm of a positive normal double, to 3e-16.
-
-    x = 2^e·m with m in [√½, √2); log m = 2 artanh(z), z = (m−1)/(m+1), as an odd polynomial: |z| ≤ 0.1716,
-    so the first term left out, 2 z²¹/21, is below 1e-17.
-    """
-    shifted = _bits_of(x) - _SQRT_HALF_BITS
-    exponent = shifted >> 52
-    mantissa = _double_of((shifted & _MANTISSA) + _SQRT_HALF_BITS)
-    z = (mantissa - 1.0) / (mantissa + 1.0)
-    w = z * z
-    series = 1 / 19.0
-    series = series * w + 1 / 17.0
-    series = series * w + 1 / 15.0
-    series = series * w + 1 / 13.0
-    series = series * w + 1 / 11.0
-    series = series * w + 1 / 9.0
-    series = series * w + 1 / 7.0
-    series = series * w + 1 / 5.0
-    series = series * w + 1 / 3.0
-    return exponent * _LN2 + (2.0 * z + 2.0 * z * w * series)
 
 
 @compiled
@@ -81,18 +19,23 @@ def stokeslets(targets: Array, sources: Array, components: Array) -> None:
     ``targets`` are (2, m), ``sources`` (2, n).  Where a target is its own source the entries are meaningless
     and the caller's to overwrite.
     """
-    scale = 1.0 / (4.0 * np.pi)
+    widest_vectors()
+    radial = 1.0 / (4.0 * np.pi)
+    isotropic = -0.5 * LOGARITHM_UNIT * radial
+    source_x, source_y = sources[0], sources[1]
     for i in range(targets.shape[1]):
         xi, yi = targets[0, i], targets[1, i]
-        for j in range(sources.shape[1]):
-            dx = xi - sources[0, j]
-            dy = yi - sources[1, j]
-            r2 = dx * dx + dy * dy
-            inverse = scale / r2
-            isotropic = -0.5 * scale * logarithm(r2)
-            components[0, i, j] = isotropic + dx * dx * inverse
-            components[1, i, j] = dx * dy * inverse
-            components[2, i, j] = isotropic + dy * dy * inverse
+        # As rows: indexed in three dimensions the loop is not turned into SIMD code.
+        xx, xy, yy = components[0, i], components[1, i], components[2, i]
+        for j in range(source_x.size):
+            dx = xi - source_x[j]
+            dy = yi - source_y[j]
+            logarithm, reciprocal = logarithm_and_reciprocal(dx * dx + dy * dy)
+            inverse = radial * reciprocal
+            diagonal = isotropic * logarithm
+            xx[j] = diagonal + dx * dx * inverse
+            xy[j] = dx * dy * inverse
+            yy[j] = diagonal + dy * dy * inverse
 
 
 @compiled

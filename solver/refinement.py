@@ -11,7 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.kernels import compiled, stokeslets
+from solver.compilation import compiled
+from solver.kernels import stokeslets
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

@@ -79,6 +79,7 @@ def simulate(
             raise StepFailedError(start.failure)
         integrator = integrator_for(
             scene.numerics,
+            len(scene.vesicles),
             dynamics.rate,
             dynamics.jacobian,
             lambda state: conserved_quantities(Geometry(dynamics.membranes, state)),

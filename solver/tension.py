@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 
+from solver.compilation import compiled
 from solver.geometry import Geometry
-from solver.kernels import compiled
 from solver.spectral import differentiation
 from solver.stokes import SingleLayer
 
@@ -194,4 +194,6 @@ class Inextensibility:
         """x_s · u_s for velocities (2, M·N, columns)."""
         gradient = geometry.column_derivative(velocity)
         gradient *= geometry.tangents.reshape(2, -1, 1)
-        return np.add(*gradient)
+        gradient[0] += gradient[1]
+        stretching: Array = gradient[0]
+        return stretching

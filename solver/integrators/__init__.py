@@ -3,11 +3,9 @@
 from solver.integrators.base import Integrator, Step, StepFailedError
 from solver.integrators.bdf import BackwardDifferentiation
 from solver.integrators.choice import integrator_for
-from solver.integrators.sdc import DeferredCorrection
 
 __all__ = [
     "BackwardDifferentiation",
-    "DeferredCorrection",
     "Integrator",
     "Step",
     "StepFailedError",

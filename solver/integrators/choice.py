@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 from solver.integrators.base import Integrator
 from solver.integrators.bdf import BackwardDifferentiation
 from solver.integrators.control import AdaptiveStep, ConservedError, EmbeddedError, ErrorMeasure
+from solver.integrators.one_step import OneStepIntegrator, OneStepMethod
+from solver.integrators.rodas5p import RODAS5P
+from solver.integrators.rosenbrock import Rosenbrock
 from solver.integrators.sdc import DeferredCorrection, estimate_power
 from solver.scene import Numerics
 
@@ -21,6 +24,7 @@ _USUAL_ORDER = 4
 
 def integrator_for(
     numerics: Numerics,
+    vesicles: int,
     rate: Callable[[Array], Array],
     jacobian: Callable[[Array], Array],
     conserved: Callable[[Array], Array],
@@ -32,6 +36,8 @@ def integrator_for(
     Parameters
     ----------
     numerics : Numerics
+    vesicles : int
+        How many are in the fluid; it decides what "auto" is.
     rate, jacobian : callable
         From a state (n,) to its rate of change (n,), and to the derivative of that, (n, n).
     conserved : callable
@@ -40,13 +46,24 @@ def integrator_for(
     end : float
         When the last step ends.
     """
-    if numerics.integrator == "bdf":
+    integrator = numerics.integrator
+    if integrator == "auto":
+        # One vesicle settles, so its errors die out, and its Jacobian is cheap: long steps win.  Measured by
+        # `ensemble report work-precision`.
+        integrator = "rosenbrock" if vesicles == 1 else "bdf"
+    if integrator == "bdf":
         return BackwardDifferentiation(rate, jacobian, state, numerics.tolerance, end)
-    order = 1 if numerics.integrator == "imex-euler" else numerics.order or _USUAL_ORDER
+    method: OneStepMethod
     measure: ErrorMeasure
-    if numerics.step_control == "area-length":
-        measure = ConservedError(conserved, numerics.tolerance, end, order)
+    if integrator == "rosenbrock":
+        method = Rosenbrock(RODAS5P)
+        measure = EmbeddedError(numerics.tolerance, RODAS5P.order)
     else:
-        measure = EmbeddedError(numerics.tolerance, estimate_power(order))
+        order = 1 if integrator == "imex-euler" else numerics.order or _USUAL_ORDER
+        method = DeferredCorrection(order)
+        if numerics.step_control == "area-length":
+            measure = ConservedError(conserved, numerics.tolerance, end, order)
+        else:
+            measure = EmbeddedError(numerics.tolerance, estimate_power(order))
     control = AdaptiveStep(measure, numerics.tolerance)
-    return DeferredCorrection(rate, jacobian, state, end, order, control)
+    return OneStepIntegrator(method, control, rate, jacobian, state, end)

@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 
 METHODS = [
     Numerics(integrator="bdf"),
+    Numerics(integrator="rosenbrock"),
     Numerics(integrator="sdc", order=3),
     Numerics(integrator="sdc", order=4),
     Numerics(integrator="sdc", order=5),
@@ -43,7 +44,7 @@ def integrator(
     end: float,
 ) -> Integrator:
     numerics = method.model_copy(update={"tolerance": tolerance})
-    return integrator_for(numerics, rate, lambda _: jacobian, lambda y: y[:1], start, end)
+    return integrator_for(numerics, 2, rate, lambda _: jacobian, lambda y: y[:1], start, end)
 
 
 def rotation(method: Numerics, tolerance: float, end: float = 6.0) -> Integrator:
