@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 
 import numpy as np
@@ -88,7 +88,7 @@ def pair_errors(
     begin: float,
     duration: float,
     counts: tuple[int, ...],
-    methods: list[OneStepMethod],
+    methods: Sequence[OneStepMethod],
     finest: OneStepMethod,
 ) -> Array:
     """Errors (methods, counts) of the sheared pair's state after steps of equal size."""

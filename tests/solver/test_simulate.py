@@ -131,20 +131,24 @@ def test_a_term_of_zero_strength_changes_round_off_only(zero: dict[str, Any]) ->
     np.testing.assert_allclose(points, expected, rtol=0, atol=1e-10)
 
 
-def test_a_circle_in_shear_stays_a_circle() -> None:
+@pytest.mark.parametrize(
+    ("integrator", "tolerance"), [("rosenbrock", 1e-4), ("rosenbrock", 1e-5), ("bdf", 1e-6)]
+)
+def test_a_circle_in_shear_stays_a_circle(integrator: str, tolerance: float) -> None:
     """It turns like a rigid disk: intrinsic viscosity 2 (Einstein's result in two dimensions).
 
-    A radius that varies by ε takes an area of the order ε², so that it is kept to the root of the tolerance.
+    A tension can only hold it against the flow through what is left of an ellipse, and grows as the inverse
+    of that: tighter tolerances lose it in round-off.
     """
     circle = Vesicle(reduced_area=1.0, length=5.0)
-    run = simulate(
-        Scene(horizon=20.0, vesicles=(circle,), flow=Shear(rate=0.5), numerics=Numerics(tolerance=1e-6))
-    )
+    numerics = Numerics.model_validate({"integrator": integrator, "tolerance": tolerance})
+    run = simulate(Scene(horizon=20.0, vesicles=(circle,), flow=Shear(rate=0.5), numerics=numerics))
     assert run.outcome is Outcome.STEADY
+    assert run.work.steps < 200
     radius = np.hypot(*np.moveaxis(frame_points(run)[:, 0], 1, 0))
-    np.testing.assert_allclose(radius, 5 / (2 * np.pi), rtol=1e-3)
+    np.testing.assert_allclose(radius, 5 / (2 * np.pi), rtol=2e-4)
     assert run.viscosity
-    assert run.viscosity.total == pytest.approx(2.0, rel=1e-5)
+    assert run.viscosity.total == pytest.approx(2.0, rel=1e-6)
 
 
 def test_a_circle_at_rest_does_not_move() -> None:
