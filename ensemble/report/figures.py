@@ -13,8 +13,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from ensemble.figures.style import BLACK, BLUE, GRAY, GREEN, ORANGE, PURPLE, SKY, STYLE, VERMILLION, WIDTH
+from ensemble.report.measurement import Measurement
 from ensemble.report.stability import Stability, Verdict
-from ensemble.report.work_precision import Measurement, WorkPrecision
+from ensemble.report.work_precision import WorkPrecision
 
 _COLORS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK)  # by method
 _SHAPES = ("o", "s", "^", "D", "v")  # by number of points

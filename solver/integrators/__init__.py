@@ -2,7 +2,7 @@
 
 from solver.integrators.base import Integrator, Step, StepFailedError
 from solver.integrators.bdf import BackwardDifferentiation
-from solver.integrators.choice import integrator_for
+from solver.integrators.choice import integrator_for, usual_integrator
 
 __all__ = [
     "BackwardDifferentiation",
@@ -10,4 +10,5 @@ __all__ = [
     "Step",
     "StepFailedError",
     "integrator_for",
+    "usual_integrator",
 ]

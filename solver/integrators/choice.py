@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,14 @@ Array = NDArray[np.float64]
 
 # Of spectral deferred correction, where a scene does not say: the least work for errors from 1e-3 to 1e-5.
 _USUAL_ORDER = 4
+
+
+def usual_integrator(vesicles: int) -> Literal["bdf", "rosenbrock"]:
+    """What "auto" is for this number of vesicles; `ensemble report work-precision` measures why.
+
+    One vesicle settles, so that its errors die out, and its Jacobian is cheap: there long steps win.
+    """
+    return "rosenbrock" if vesicles == 1 else "bdf"
 
 
 def integrator_for(
@@ -46,11 +55,7 @@ def integrator_for(
     end : float
         When the last step ends.
     """
-    integrator = numerics.integrator
-    if integrator == "auto":
-        # One vesicle settles, so its errors die out, and its Jacobian is cheap: long steps win.  Measured by
-        # `ensemble report work-precision`.
-        integrator = "rosenbrock" if vesicles == 1 else "bdf"
+    integrator = usual_integrator(vesicles) if numerics.integrator == "auto" else numerics.integrator
     if integrator == "bdf":
         return BackwardDifferentiation(rate, jacobian, state, numerics.tolerance, end)
     method: OneStepMethod

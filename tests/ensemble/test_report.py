@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 
 from ensemble.figures import save
+from ensemble.report.envelope import ERRORS, envelopes
 from ensemble.report.extremes import GROUPS
 from ensemble.report.figures import error_figures
 from ensemble.report.markdown import work_precision_text
-from ensemble.report.methods import DEFAULT, FULL, QUICK, Method, Plan
+from ensemble.report.measurement import Measurement
+from ensemble.report.methods import BDF, FULL, QUICK, ROSENBROCK, Method, Plan
 from ensemble.report.runs import Runs
 from ensemble.report.scenes import SCENES
 from ensemble.report.shape import shape_distance
@@ -26,7 +28,7 @@ from ensemble.report.stability import (
     quick_groups,
     stability,
 )
-from ensemble.report.work_precision import Measurement, WorkPrecision, slopes, work_precision
+from ensemble.report.work_precision import WorkPrecision, slopes, work_precision
 from ensemble.store import Store
 from solver import curve
 from solver.run import Outcome
@@ -35,7 +37,7 @@ from solver.shapes import ellipse_tangent_angle
 from solver.simulate import simulate
 
 TINY = Plan(
-    methods=(DEFAULT,),
+    methods=(BDF,),
     points=(32,),
     tolerances=(1e-2, 1e-4),
     work_limit=5_000,
@@ -163,8 +165,8 @@ def test_the_report_is_drawn_and_written(report, tmp_path):
 
 
 def test_a_run_that_fails_has_no_error_and_ends_its_series(store):
-    scarce = Method("BDF, scarce", {"work_limit": 200})
-    plan = replace(TINY, methods=(DEFAULT, scarce), tolerances=(1e-2, 1e-7, 1e-8))
+    scarce = Method("BDF, scarce", {"integrator": "bdf", "work_limit": 200})
+    plan = replace(TINY, methods=(BDF, scarce), tolerances=(1e-2, 1e-7, 1e-8))
     measured = work_precision(Runs(store, lambda line: None), plan, ONE_SCENE)
     series = [point for point in measured.measurements if point.method == "BDF, scarce"]
     assert [point.tolerance for point in series] == [1e-2, 1e-7]
@@ -192,6 +194,35 @@ def test_observed_orders_leave_out_the_floor(report):
     assert fourth.order == pytest.approx(4.0, abs=0.02)
     (alone,) = slopes(series(2.0, 1.0, "floor only"))
     assert alone.order is None
+
+
+def test_the_envelope_is_the_least_time_to_an_error_at_any_resolution(report):
+    template = report.measurements[0]
+
+    def measured(method: str, points: int, error: float | None, seconds: float) -> Measurement:
+        changed = {"method": method, "points": points, "error_rms": error, "wall_seconds": seconds}
+        return template.model_copy(update=changed)
+
+    found = envelopes(
+        ONE_SCENE,
+        [
+            measured(ROSENBROCK.name, 32, 5e-3, 0.2),
+            measured(ROSENBROCK.name, 64, 8e-5, 0.3),
+            measured(ROSENBROCK.name, 64, None, 0.01),
+            measured(BDF.name, 32, 2e-4, 0.1),
+            measured("SDC, order 2", 32, 9e-4, 1.5),
+            template.model_copy(update={"scene": "another", "error_rms": 1e-9, "wall_seconds": 1e-3}),
+        ],
+    )
+    assert [row.error for row in found] == list(ERRORS)
+    assert {row.default for row in found} == {ROSENBROCK.name}
+    coarse, middle, fine, *finer = found
+    assert (coarse.fastest, coarse.fastest_seconds, coarse.default_seconds) == (BDF.name, 0.1, 0.2)
+    assert coarse.slowdown == pytest.approx(2.0)
+    assert middle.slowdown == pytest.approx(3.0)
+    assert middle.speedup == pytest.approx(5.0)
+    assert (fine.fastest, fine.slowdown, fine.speedup) == (ROSENBROCK.name, 1.0, None)
+    assert all(row.fastest is row.default_seconds is row.slowdown is None for row in finer)
 
 
 @pytest.mark.parametrize("plan", [QUICK, FULL])
