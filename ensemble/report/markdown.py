@@ -130,8 +130,8 @@ def work_precision_text(report: WorkPrecision, figures: Sequence[str]) -> str:
         f"{FLOOR:g} times the least one at the same N, where the error in space shows.",
         table(_SLOPE, report.slopes),
         "## Least time to an error",
-        "The least time in which a run came within this error, at whatever tolerance and number of points: by "
-        "the fastest method, by the default one, and beside spectral deferred correction of order 2.",
+        "The least time in which a run came within this error, at whatever tolerance and number of points: "
+        "by the fastest method, by the default one, and beside spectral deferred correction of order 2.",
         table(_ENVELOPE, report.envelopes),
         "## Position error",
         table(_MEASUREMENT, report.measurements),
