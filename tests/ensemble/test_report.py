@@ -97,7 +97,7 @@ def test_a_curve_offset_along_its_normals_is_that_far_away(offset):
 
 def test_the_error_falls_with_the_tolerance(report):
     loose, tight = report.measurements
-    assert (loose.tolerance, tight.tolerance) == (1e-2, 1e-4)
+    assert (loose.tolerance, tight.tolerance) == TINY.tolerances
     assert tight.error_rms < 0.1 * loose.error_rms
     assert tight.error_rms <= tight.error_max
     assert tight.evaluations > loose.evaluations
