@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipeinc
 
+from solver import curve
+
 Array = NDArray[np.float64]
 
 
@@ -31,11 +33,28 @@ def semi_axes(reduced_area: float, length: float) -> tuple[float, float]:
 def ellipse_tangent_angle(reduced_area: float, length: float, angle: float, points: int) -> Array:
     """Tangent angles at ``points`` positions equispaced in arclength, (points,).
 
+    The membrane through them has the reduced area to round-off, even where the points do not resolve the
+    tips: the deviation from a circle's angles is scaled for that.
+
     Parameters
     ----------
     angle : float
         Direction of the long axis against x, radians.  The first point is its tip.
     """
+    circle = np.pi / 2 + 2 * np.pi * np.arange(points) / points
+    deviation = _sampled_ellipse(reduced_area, length, points) - circle
+
+    def excess(scale: float) -> float:
+        theta = circle + scale * deviation
+        area = curve.area(curve.positions(theta, np.zeros(2), 2 * np.pi), curve.tangents(theta), 2 * np.pi)
+        return float(area / np.pi - reduced_area)
+
+    scale = brentq(excess, 0.5, 1.5, xtol=1e-15, rtol=1e-15) if np.any(deviation) else 1.0
+    return angle + circle + scale * deviation
+
+
+def _sampled_ellipse(reduced_area: float, length: float, points: int) -> Array:
+    """Tangent angles of the ellipse along x."""
     major, minor = semi_axes(reduced_area, length)
     parameter = 1 - (minor / major) ** 2
     arclength = length * np.arange(points) / points
@@ -51,4 +70,4 @@ def ellipse_tangent_angle(reduced_area: float, length: float, angle: float, poin
     alpha = phi + np.pi / 2
     # The tangent (−a sin α, b cos α), its angle continued beyond ±π.
     turned = np.arctan2(minor * np.cos(alpha), -major * np.sin(alpha))
-    return angle + np.unwrap(turned)
+    return np.unwrap(turned)
