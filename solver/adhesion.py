@@ -29,6 +29,11 @@ class Adhesion:
     parameters : scene.Adhesion
     accuracy : float
         Relative error allowed in the force between two nearly parallel membranes.
+
+    Attributes
+    ----------
+    ratio : float
+        Distance over spacing to which sources are refined for a target.
     """
 
     def __init__(self, parameters: scene.Adhesion, accuracy: float) -> None:
@@ -36,7 +41,7 @@ class Adhesion:
         self._potential = parameters.distance, m, n
         self._hamaker = parameters.hamaker
         # Over a nearly straight membrane the force kernel is like 1/(s² + d²)^(m/2 + 1).
-        self._ratio = required_ratio(0.5 * m + 1, accuracy)
+        self.ratio = required_ratio(0.5 * m + 1, accuracy)
 
     def density(self, geometry: Geometry, closeness: Closeness) -> Array:
         """Force per length, (2, M, N)."""
@@ -57,7 +62,7 @@ class Adhesion:
         return *self._sums(geometry, closeness), self._hamaker * self._potential[1]
 
     def _sums(self, geometry: Geometry, closeness: Closeness) -> tuple[Any, ...]:
-        refinement = closeness.refinement(self._ratio)
+        refinement = closeness.refinement(self.ratio)
         return geometry.curve_points, geometry.membranes.curve_spacing, refinement, *self._potential
 
     def energy(self, geometry: Geometry, closeness: Closeness) -> float:

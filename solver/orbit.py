@@ -25,10 +25,12 @@ class Orbit:
         Whether the distance has passed the separated distance, growing.
     half_turns : list of float
         ``half_turns[k]`` is when the line had first turned by kπ from its start, either way.
+    membranes : Membranes
+        Those of the steps; others may take their place.
     """
 
     def __init__(self, membranes: Membranes, state: Array, separated_distance: float) -> None:
-        self._membranes = membranes
+        self.membranes = membranes
         self._separated_distance = separated_distance
         offset = self._offset(state)
         self.angle = self._start = float(np.arctan2(offset[1], offset[0]))
@@ -67,7 +69,7 @@ class Orbit:
         return self.half_turns[-1] - self.half_turns[-3] if len(self.half_turns) > 2 else None
 
     def _offset(self, state: Array) -> Array:
-        first, second = self._membranes.curve_center(state)
+        first, second = self.membranes.curve_center(state)
         return np.asarray(second - first)
 
     def _excess_turn(self, state: Array) -> float:

@@ -20,6 +20,8 @@ class Closeness:
     ----------
     distances : (M, C, N)
         Distance over the source's spacing, by target, source and point of the target.
+    nearest : float
+        The smallest of them.
     """
 
     def __init__(self, geometry: Geometry) -> None:
@@ -30,12 +32,12 @@ class Closeness:
             geometry.curve_points, geometry.curve_tangents, spacing, membranes.count
         )
         self.distances /= spacing[:, None]
-        self._nearest = float(self.distances.min())
+        self.nearest = float(self.distances.min())
 
     def refinement(self, ratio: float) -> Refinement:
         """The refinement that brings every target to ``ratio`` spacings of every source."""
         factor = 1
-        while factor < MAXIMUM_FACTOR and factor * self._nearest < ratio:
+        while factor < MAXIMUM_FACTOR and factor * self.nearest < ratio:
             factor *= 2
         groups, rows, starts = group_targets(self.distances, ratio)
         return Refinement(groups, rows, starts, interpolations(self._points, factor))

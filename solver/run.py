@@ -70,6 +70,7 @@ class Work:
     factorizations: int
     wall_seconds: float
     smallest_step: float | None = None  # accepted, in time; None if none was taken
+    points: int | None = None  # on each vesicle at the end; None in records from before it could change
 
 
 # Diagnostics by name, each of shape (time,) and sampled at `Series["time"]`.  Always present: time,
@@ -82,7 +83,7 @@ Series = Mapping[str, Array]
 
 @dataclass(frozen=True)
 class Frames:
-    """Recorded states.
+    """Recorded states, all with as many points as the last one.
 
     time : (frames,)
     tangent_angle : (frames, vesicles, points)

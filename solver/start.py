@@ -15,13 +15,13 @@ Array = NDArray[np.float64]
 
 def placed_state(scene: Scene) -> Array:
     """Ellipses where the scene places them."""
-    vesicles = independent_vesicles(scene)
+    vesicles, membranes = independent_vesicles(scene), Membranes.of_scene(scene)
     tangent_angle = [
-        ellipse_tangent_angle(vesicle.reduced_area, vesicle.length, vesicle.angle, scene.numerics.points)
+        ellipse_tangent_angle(vesicle.reduced_area, vesicle.length, vesicle.angle, membranes.points)
         for vesicle in vesicles
     ]
     center = [vesicle.center for vesicle in vesicles]
-    return Membranes.of_scene(scene).pack(np.array(tangent_angle), np.array(center))
+    return membranes.pack(np.array(tangent_angle), np.array(center))
 
 
 def turned_state(membranes: Membranes, state: Array, tilt: float) -> Array:

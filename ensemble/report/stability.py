@@ -121,7 +121,8 @@ def _row(runs: Runs, group: str, name: str, scene: Scene) -> Row:
             horizon=scene.horizon,
         )
     smallest_gap = float(np.min(run.series["gap"])) if "gap" in run.series else None
-    resolution = None if smallest_gap is None else gap_resolution(scene, smallest_gap)
+    points = run.frames.tangent_angle.shape[-1]
+    resolution = None if smallest_gap is None else gap_resolution(scene, points, smallest_gap)
     rise = energy_rise(run) if scene.flow is None else None
     verdict, reason = judge(run, resolution, rise)
     return Row(
@@ -148,9 +149,9 @@ def _row(runs: Runs, group: str, name: str, scene: Scene) -> Row:
     )
 
 
-def gap_resolution(scene: Scene, gap: float) -> float:
+def gap_resolution(scene: Scene, points: int, gap: float) -> float:
     """How finely the quadrature samples membranes at a gap, over what `QUADRATURE_ERROR` needs."""
-    spacing = max(vesicle.length for vesicle in scene.vesicles) / scene.numerics.points
+    spacing = max(vesicle.length for vesicle in scene.vesicles) / points
     # The kernels of the fluid and of adhesion over a straight membrane: see `solver.adhesion`.
     order = 1.0 if scene.adhesion is None else 0.5 * scene.adhesion.exponents[0] + 1
     return MAXIMUM_FACTOR * gap / spacing / required_ratio(order, QUADRATURE_ERROR)

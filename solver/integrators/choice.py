@@ -26,8 +26,9 @@ def integrator_for(
     conserved: Callable[[Array], Array],
     state: Array,
     end: float,
+    start: float = 0.0,
 ) -> Integrator:
-    """The integrator that ``numerics`` asks for, at time 0.
+    """The integrator that ``numerics`` asks for.
 
     Parameters
     ----------
@@ -39,9 +40,11 @@ def integrator_for(
     state : (n,)
     end : float
         When the last step ends.
+    start : float
+        When the first one begins.
     """
     if numerics.integrator == "bdf":
-        return BackwardDifferentiation(rate, jacobian, state, numerics.tolerance, end)
+        return BackwardDifferentiation(rate, jacobian, state, numerics.tolerance, end, start)
     order = 1 if numerics.integrator == "imex-euler" else numerics.order or _USUAL_ORDER
     measure: ErrorMeasure
     if numerics.step_control == "area-length":
@@ -49,4 +52,4 @@ def integrator_for(
     else:
         measure = EmbeddedError(numerics.tolerance, estimate_power(order))
     control = AdaptiveStep(measure, numerics.tolerance)
-    return DeferredCorrection(rate, jacobian, state, end, order, control)
+    return DeferredCorrection(rate, jacobian, state, end, order, control, start)

@@ -112,13 +112,15 @@ class DeferredCorrection:
     rate, jacobian : callable
         From a state (n,) to its rate of change (n,), and to the derivative of that, (n, n).
     state : (n,)
-        At time 0.
+        At time ``start``.
     end : float
         The last step ends here.
     order : int
         1 is linearly implicit Euler without a sweep (IMEX-Euler); every further order is one more sweep, up
         to 8: a ninth would amplify modes much faster than the step.
     control : StepControl
+    start : float
+        The first step begins here.
     """
 
     def __init__(
@@ -129,12 +131,13 @@ class DeferredCorrection:
         end: float,
         order: int,
         control: StepControl,
+        start: float = 0.0,
     ) -> None:
         self.jacobian_evaluations = 0
         self.factorizations = 0
         self._rate = rate
         self._jacobian = jacobian
-        self._time = 0.0
+        self._time = start
         self._state = state
         self._slope = rate(state)
         self._end = end

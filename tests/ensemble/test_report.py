@@ -234,7 +234,7 @@ def test_verdicts_follow_the_criteria():
     pair = EXTREMES["start at a quarter of the adhesion distance, at rest"]
     coarse = Numerics(points=48, tolerance=1e-3)
     run = simulate(pair.model_copy(update={"horizon": 2.0, "numerics": coarse}))
-    resolution = gap_resolution(run.scene, float(run.series["gap"].min()))
+    resolution = gap_resolution(run.scene, 48, float(run.series["gap"].min()))
     rise = energy_rise(run)
     assert judge(run, resolution, rise) == (Verdict.FINE, "")
 
@@ -261,12 +261,13 @@ def test_the_energy_rise_is_the_largest_above_any_earlier_value():
 
 def test_the_gap_resolution_tells_where_adhesion_loses_its_accuracy():
     scene = EXTREMES["distance 0.1, at rest"]
-    spacing = 2 * np.pi / scene.numerics.points
+    spacing = 2 * np.pi / 64
     # 32 sub-intervals over one spacing; the steeper potential needs more of them.
     steep = scene.model_copy(update={"adhesion": scene.adhesion.model_copy(update={"exponents": (24, 12)})})
-    assert gap_resolution(scene, spacing) > 1 > gap_resolution(scene, spacing / 32)
-    assert gap_resolution(steep, spacing) < gap_resolution(scene, spacing)
-    assert gap_resolution(scene, 2 * spacing) == pytest.approx(2 * gap_resolution(scene, spacing))
+    assert gap_resolution(scene, 64, spacing) > 1 > gap_resolution(scene, 64, spacing / 32)
+    assert gap_resolution(steep, 64, spacing) < gap_resolution(scene, 64, spacing)
+    assert gap_resolution(scene, 64, 2 * spacing) == pytest.approx(2 * gap_resolution(scene, 64, spacing))
+    assert gap_resolution(scene, 128, spacing) == pytest.approx(2 * gap_resolution(scene, 64, spacing))
 
 
 def test_a_scene_that_raises_does_not_hide_the_others(store):
