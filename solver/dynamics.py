@@ -21,12 +21,17 @@ from solver.flow import ImposedFlow, imposed_flow
 from solver.geometry import Geometry, Membranes
 from solver.gliding import glide, gliding_direction, gliding_speed, gliding_speed_by_curvature
 from solver.proximity import Closeness
-from solver.scene import Scene
+from solver.scene import Numerics, Scene
 from solver.spectral import differentiation, highest_modes, integration
 from solver.stokes import SingleLayer
-from solver.tension import Inextensibility
+from solver.tension import ROUND_OFF, Inextensibility
 
 Array = NDArray[np.float64]
+
+
+def accuracy_of(numerics: Numerics) -> float:
+    """Of sums and iterations; so far below the time integrator's that they do not limit its step."""
+    return float(np.clip(1e-3 * numerics.tolerance, 1e-12, 1e-7))
 
 
 @dataclass(frozen=True)
@@ -67,14 +72,13 @@ class Dynamics:
         """The terms of a scene."""
         membranes = Membranes.of_scene(scene)
         several = membranes.curves > 1
-        # Of sums and iterations; so far below the time integrator's that they do not limit its step.
-        accuracy = float(np.clip(1e-3 * scene.numerics.tolerance, 1e-12, 1e-7))
+        accuracy = accuracy_of(scene.numerics)
         return cls(
             membranes=membranes,
             bending=Bending(),
             adhesion=Adhesion(scene.adhesion, accuracy) if scene.adhesion and several else None,
             flow=imposed_flow(scene.flow, membranes) if scene.flow else None,
-            inextensibility=Inextensibility(accuracy),
+            inextensibility=Inextensibility(accuracy, 1e-3 * accuracy if several else ROUND_OFF),
             layer=SingleLayer(membranes, accuracy),
         )
 

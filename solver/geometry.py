@@ -45,9 +45,11 @@ class Membranes:
 
     @classmethod
     def of_scene(cls, scene: Scene) -> Self:
-        """The membranes that have to be computed for a scene."""
-        vesicles = independent_vesicles(scene)
-        return cls.of(vesicles, scene.numerics.points, len(scene.vesicles) // len(vesicles))
+        """The membranes that have to be computed for a scene whose number of points is given."""
+        vesicles, points = independent_vesicles(scene), scene.numerics.points
+        if points == "auto":
+            raise ValueError("numerics.points is 'auto': its number must have been chosen (see `resolution`)")
+        return cls.of(vesicles, points, len(scene.vesicles) // len(vesicles))
 
     @property
     def count(self) -> int:

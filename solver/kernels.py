@@ -136,6 +136,23 @@ def distances(targets: Array, sources: Array, tangents: Array, spacing: float, o
 
 
 @compiled
+def waists(points: Array) -> Array:
+    """Smallest distance (M,) between points (2, M, n) of a curve that lie at least an eighth of it apart."""
+    count, n = points.shape[1], points.shape[2]
+    out = np.empty(count)
+    apart = n // 8
+    for vesicle in range(count):
+        nearest = np.inf
+        for i in range(n):
+            for j in range(i + apart, min(n, i + n - apart + 1)):
+                dx = points[0, vesicle, i] - points[0, vesicle, j]
+                dy = points[1, vesicle, i] - points[1, vesicle, j]
+                nearest = min(nearest, dx * dx + dy * dy)
+        out[vesicle] = np.sqrt(nearest)
+    return out
+
+
+@compiled
 def pair_distances(points: Array, tangents: Array, spacing: Array, count: int) -> Array:
     """`distances` for all ordered pairs: [a, b, i] is that of point i of curve a < ``count`` to curve b.
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.geometry import Geometry
-from solver.kernels import pair_distances
+from solver.kernels import pair_distances, waists
 from solver.refinement import MAXIMUM_FACTOR, Refinement, group_targets
 from solver.spectral import interpolation, interpolations
 
@@ -20,6 +20,8 @@ class Closeness:
     ----------
     distances : (M, C, N)
         Distance over the source's spacing, by target, source and point of the target.
+    nearest : float
+        The smallest of them.
     """
 
     def __init__(self, geometry: Geometry) -> None:
@@ -30,15 +32,25 @@ class Closeness:
             geometry.curve_points, geometry.curve_tangents, spacing, membranes.count
         )
         self.distances /= spacing[:, None]
-        self._nearest = float(self.distances.min())
+        self.nearest = float(self.distances.min())
 
     def refinement(self, ratio: float) -> Refinement:
         """The refinement that brings every target to ``ratio`` spacings of every source."""
         factor = 1
-        while factor < MAXIMUM_FACTOR and factor * self._nearest < ratio:
+        while factor < MAXIMUM_FACTOR and factor * self.nearest < ratio:
             factor *= 2
         groups, rows, starts = group_targets(self.distances, ratio)
         return Refinement(groups, rows, starts, interpolations(self._points, factor))
+
+
+def waist_error(geometry: Geometry) -> Array:
+    """Relative error (M,) of the single layer across each vesicle's own waist.
+
+    There the trapezoid rule, with the logarithm of the neighborhood split off, errs as on another membrane
+    (`quadrature`), and nothing is refined.
+    """
+    waist = waists(geometry.points)
+    return np.asarray(2 * np.exp(-2 * np.pi * waist / geometry.membranes.spacing))
 
 
 def gap(geometry: Geometry, refinement: int = 4) -> float:

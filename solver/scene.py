@@ -105,7 +105,8 @@ class Start(Model):
 class Numerics(Model):
     """Resolution in space and time."""
 
-    points: int = Field(64, ge=16, le=1024, multiple_of=2)  # on each vesicle
+    # On each vesicle; "auto": as many as the tolerance needs, and more when a run comes to need them.
+    points: Annotated[int, Field(ge=16, le=1024, multiple_of=2)] | Literal["auto"] = 64
     tolerance: float = Field(1e-4, ge=1e-12, le=0.1)  # local error of tangent angle and center, absolute
     integrator: Literal["auto", "bdf", "rosenbrock", "sdc", "imex-euler"] = "auto"
     order: int | None = Field(None, ge=2, le=8)  # of "sdc"; None: its usual one

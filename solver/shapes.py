@@ -30,31 +30,34 @@ def semi_axes(reduced_area: float, length: float) -> tuple[float, float]:
     return major, major * aspect
 
 
-def ellipse_tangent_angle(reduced_area: float, length: float, angle: float, points: int) -> Array:
-    """Tangent angles at ``points`` positions equispaced in arclength, (points,).
+def of_reduced_area(tangent_angle: Array, reduced_area: float) -> Array:
+    """Tangent angles (points,) of a membrane like the given one (points,) that has the reduced area.
 
-    The membrane through them has the reduced area to round-off, even where the points do not resolve the
-    tips: the deviation from a circle's angles is scaled for that.
-
-    Parameters
-    ----------
-    angle : float
-        Direction of the long axis against x, radians.  The first point is its tip.
+    Its deviation from a circle is scaled.  For an ellipse that the points resolve this changes nothing but
+    round-off; where they do not resolve its tips, the area through them is not the ellipse's.
     """
-    circle = np.pi / 2 + 2 * np.pi * np.arange(points) / points
-    deviation = _sampled_ellipse(reduced_area, length, points) - circle
+    turned = 2 * np.pi * np.arange(tangent_angle.size) / tangent_angle.size
+    circle = turned + np.mean(tangent_angle - turned)
+    deviation = tangent_angle - circle
 
     def excess(scale: float) -> float:
         theta = circle + scale * deviation
         area = curve.area(curve.positions(theta, np.zeros(2), 2 * np.pi), curve.tangents(theta), 2 * np.pi)
         return float(area / np.pi - reduced_area)
 
-    scale = brentq(excess, 0.5, 1.5, xtol=1e-15, rtol=1e-15) if np.any(deviation) else 1.0
-    return angle + circle + scale * deviation
+    if np.max(np.abs(deviation)) < 1e-12:
+        return tangent_angle
+    return np.asarray(circle + brentq(excess, 0.5, 1.5, xtol=1e-15, rtol=1e-15) * deviation)
 
 
-def _sampled_ellipse(reduced_area: float, length: float, points: int) -> Array:
-    """Tangent angles of the ellipse along x."""
+def ellipse_tangent_angle(reduced_area: float, length: float, angle: float, points: int) -> Array:
+    """Tangent angles at ``points`` positions equispaced in arclength, (points,).
+
+    Parameters
+    ----------
+    angle : float
+        Direction of the long axis against x, radians.  The first point is its tip.
+    """
     major, minor = semi_axes(reduced_area, length)
     parameter = 1 - (minor / major) ** 2
     arclength = length * np.arange(points) / points
@@ -70,4 +73,4 @@ def _sampled_ellipse(reduced_area: float, length: float, points: int) -> Array:
     alpha = phi + np.pi / 2
     # The tangent (−a sin α, b cos α), its angle continued beyond ±π.
     turned = np.arctan2(minor * np.cos(alpha), -major * np.sin(alpha))
-    return np.unwrap(turned)
+    return angle + np.unwrap(turned)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from solver.geometry import Membranes
 from solver.scene import Scene
-from solver.shapes import ellipse_tangent_angle
+from solver.shapes import ellipse_tangent_angle, of_reduced_area
 from solver.symmetry import independent_vesicles
 
 Array = NDArray[np.float64]
@@ -15,13 +15,16 @@ Array = NDArray[np.float64]
 
 def placed_state(scene: Scene) -> Array:
     """Ellipses where the scene places them."""
-    vesicles = independent_vesicles(scene)
+    vesicles, membranes = independent_vesicles(scene), Membranes.of_scene(scene)
     tangent_angle = [
-        ellipse_tangent_angle(vesicle.reduced_area, vesicle.length, vesicle.angle, scene.numerics.points)
+        of_reduced_area(
+            ellipse_tangent_angle(vesicle.reduced_area, vesicle.length, vesicle.angle, membranes.points),
+            vesicle.reduced_area,
+        )
         for vesicle in vesicles
     ]
     center = [vesicle.center for vesicle in vesicles]
-    return Membranes.of_scene(scene).pack(np.array(tangent_angle), np.array(center))
+    return membranes.pack(np.array(tangent_angle), np.array(center))
 
 
 def turned_state(membranes: Membranes, state: Array, tilt: float) -> Array:

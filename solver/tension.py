@@ -25,9 +25,7 @@ from solver.stokes import SingleLayer
 
 Array = NDArray[np.float64]
 
-# Relative weight of the mean tension that keeps the inverse finite for a circle.  There a constant tension
-# is a pressure and moves nothing, so its value does not matter; it must only not be divided by round-off.
-_CIRCLE_SHIFT = 1e-13
+ROUND_OFF = 1e-15  # the least `Inextensibility.elasticity` that means anything
 
 
 class TensionNotFoundError(ArithmeticError):
@@ -54,6 +52,7 @@ def _conjugate_gradients(
     wavenumber: Array,
     spacing: Array,
     inverse: Array,
+    shift: float,
     tolerance: float,
     natural_rate: float,
     limit: int,
@@ -65,8 +64,9 @@ def _conjugate_gradients(
     """Write what `Inextensible` holds; return the number of iterations, or −1 if ``limit`` was not enough.
 
     ``layer`` is the matrix of the single-layer potential, ``derivative`` the transposed one of
-    differentiation; ``wavenumber`` (M, 1) = 2π/length; ``imposed`` (2, M, N) is the velocity u₀ without
-    tension, and ``natural_rate`` a stretching that counts as large.
+    differentiation; ``wavenumber`` (M, 1) = 2π/length; ``shift`` times the mean tension is added to A σ;
+    ``imposed`` (2, M, N) is the velocity u₀ without tension, and ``natural_rate`` a stretching that counts as
+    large.
     """
     count, points = tension.shape
     size = count * points
@@ -90,6 +90,9 @@ def _conjugate_gradients(
         change = np.dot(layer, forces.reshape(2 * size))
         gradient = np.dot(change.reshape(2 * count, points), derivative).reshape(imposed.shape)
         image = (-(tangents[0] * gradient[0] + tangents[1] * gradient[1]) * weight).reshape(size)
+        for vesicle in range(count):
+            own = slice(vesicle * points, (vesicle + 1) * points)
+            image[own] += shift * direction[own].mean()
         step = product / np.dot(direction, image)
         solution += step * direction
         flow += step * change
@@ -113,12 +116,18 @@ class Inextensibility:
     tolerance : float
         Stretching left over, relative to that without tension or to `Membranes.natural_rate` if that is
         larger: in a state of rest there is no other scale.
+    elasticity : float
+        How much a constant tension stretches a membrane, relative to a varying one.  On a circle such a
+        tension is a pressure that moves nothing: it must not be divided by round-off, nor by the error of
+        the sums over other membranes.  A vesicle whose ellipticity squared is below this gives way.
     """
 
-    def __init__(self, tolerance: float) -> None:
+    def __init__(self, tolerance: float, elasticity: float) -> None:
         self.tolerance = tolerance
         self.iterations = 0
+        self._elasticity = elasticity
         self._inverse: Array | None = None
+        self._shift = 0.0
 
     def solve(self, layer: SingleLayer, geometry: Geometry, imposed: Array) -> Inextensible:
         """The motion when all forces but the tension, and the flow, cause the velocity ``imposed`` (2, M, N).
@@ -142,6 +151,7 @@ class Inextensibility:
                 membranes.wavenumber,
                 membranes.spacing[:, None],
                 self._inverse,
+                self._shift,
                 self.tolerance,
                 membranes.natural_rate,
                 limit,
@@ -171,14 +181,14 @@ class Inextensibility:
         flow = of_tangents[:, :, 0] + of_tangents[:, :, 1]
         system = self.stretching(geometry, flow)
         system *= -np.repeat(membranes.spacing, points)[:, None]
-        # A circle shifts by a constant; and differentiation loses the highest mode, whose tension gets the
-        # weight of its neighbors.
         typical = np.trace(system) / (count * points)
+        self._shift = self._elasticity * typical
+        # Differentiation loses the highest mode, whose tension gets the weight of its neighbors.
         alternating = np.where(np.arange(points) % 2 == 0, 1.0, -1.0)
-        shift = typical * (_CIRCLE_SHIFT * count + np.outer(alternating, alternating) / points)
+        added = (self._shift + typical * np.outer(alternating, alternating)) / points
         for vesicle in range(count):
             block = slice(vesicle * points, (vesicle + 1) * points)
-            system[block, block] += shift
+            system[block, block] += added
         # The lower triangle is used alone: the operator is symmetric up to quadrature error.
         factor, failed = lapack.dpotrf(system.T, lower=0, overwrite_a=1)
         if failed:

@@ -71,11 +71,11 @@ class Plan:
 
 QUICK = Plan(
     methods=(BDF, ROSENBROCK, deferred_correction(2), deferred_correction(4), EULER),
-    points=(32, 64),
-    tolerances=(1e-2, 1e-3, 1e-4, 1e-5),
+    points=(48, 96),
+    tolerances=(1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7),
     work_limit=5_000,
-    reference=(96, 1e-8),
-    control=(80, 1e-7),
+    reference=(128, 1e-9),
+    control=(112, 1e-8),
     answer_points=64,
     answer_tolerances=(1e-2, 1e-3, 1e-4),
     answer_reference=(80, 1e-7),

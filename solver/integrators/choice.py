@@ -39,8 +39,9 @@ def integrator_for(
     conserved: Callable[[Array], Array],
     state: Array,
     end: float,
+    start: float = 0.0,
 ) -> Integrator:
-    """The integrator that ``numerics`` asks for, at time 0.
+    """The integrator that ``numerics`` asks for.
 
     Parameters
     ----------
@@ -54,10 +55,12 @@ def integrator_for(
     state : (n,)
     end : float
         When the last step ends.
+    start : float
+        When the first one begins.
     """
     integrator = usual_integrator(vesicles) if numerics.integrator == "auto" else numerics.integrator
     if integrator == "bdf":
-        return BackwardDifferentiation(rate, jacobian, state, numerics.tolerance, end)
+        return BackwardDifferentiation(rate, jacobian, state, numerics.tolerance, end, start)
     method: OneStepMethod
     measure: ErrorMeasure
     if integrator == "rosenbrock":
@@ -71,4 +74,4 @@ def integrator_for(
         else:
             measure = EmbeddedError(numerics.tolerance, estimate_power(order))
     control = AdaptiveStep(measure, numerics.tolerance)
-    return OneStepIntegrator(method, control, rate, jacobian, state, end)
+    return OneStepIntegrator(method, control, rate, jacobian, state, end, start)

@@ -81,9 +81,9 @@ class OneStepIntegrator:
     rate, jacobian : callable
         From a state (n,) to its rate of change (n,), and to the derivative of that, (n, n).
     state : (n,)
-        At time 0.
-    end : float
-        The last step ends here.
+        Where the first step begins.
+    end, start : float
+        When the last step ends and the first begins.
     """
 
     def __init__(
@@ -94,6 +94,7 @@ class OneStepIntegrator:
         jacobian: Callable[[Array], Array],
         state: Array,
         end: float,
+        start: float = 0.0,
     ) -> None:
         self.jacobian_evaluations = 0
         self.factorizations = 0
@@ -101,7 +102,7 @@ class OneStepIntegrator:
         self._control = control
         self._rate = rate
         self._jacobian = jacobian
-        self._time = 0.0
+        self._time = start
         self._end = end
         self._state = state
         self._slope: Array | None = None

@@ -23,7 +23,6 @@ from ensemble.report.stability import (
     Stability,
     Verdict,
     energy_rise,
-    gap_resolution,
     judge,
     quick_groups,
     stability,
@@ -266,21 +265,19 @@ def test_verdicts_follow_the_criteria():
     pair = EXTREMES["start at a quarter of the adhesion distance, at rest"]
     coarse = Numerics(points=48, tolerance=1e-3)
     run = simulate(pair.model_copy(update={"horizon": 2.0, "numerics": coarse}))
-    resolution = gap_resolution(run.scene, float(run.series["gap"].min()))
     rise = energy_rise(run)
-    assert judge(run, resolution, rise) == (Verdict.FINE, "")
+    assert judge(run, rise) == (Verdict.FINE, "")
 
     def with_errors(**errors: float):
         return replace(run, error=replace(run.error, **errors))
 
-    assert judge(run, 0.99, rise)[0] is Verdict.SPACE
-    assert judge(with_errors(spatial=2e-3), resolution, rise)[0] is Verdict.SPACE
-    assert judge(with_errors(spatial=float("nan")), resolution, rise)[0] is Verdict.SPACE
-    assert judge(with_errors(area=2e-2), resolution, rise)[0] is Verdict.TIME
-    assert judge(with_errors(closure=2e-2), resolution, rise)[0] is Verdict.TIME
-    assert judge(run, resolution, 2e-3)[0] is Verdict.TIME
+    assert judge(with_errors(spatial=2e-3), rise)[0] is Verdict.SPACE
+    assert judge(with_errors(spatial=float("nan")), rise)[0] is Verdict.SPACE
+    assert judge(with_errors(area=2e-2), rise)[0] is Verdict.TIME
+    assert judge(with_errors(closure=2e-2), rise)[0] is Verdict.TIME
+    assert judge(run, 2e-3)[0] is Verdict.TIME
     failed = replace(run, outcome=Outcome.FAILED, failure="no step is small enough")
-    assert judge(failed, resolution, rise) == (Verdict.FAILED, "no step is small enough")
+    assert judge(failed, rise) == (Verdict.FAILED, "no step is small enough")
 
 
 def test_the_energy_rise_is_the_largest_above_any_earlier_value():
@@ -289,16 +286,6 @@ def test_the_energy_rise_is_the_largest_above_any_earlier_value():
     assert energy_rise(run) < 1e-6
     climbing = replace(run, series={**run.series, "bending_energy": np.array([10.0, 6.0, 8.0, 5.0, 6.5])})
     assert energy_rise(climbing) == pytest.approx(0.2)
-
-
-def test_the_gap_resolution_tells_where_adhesion_loses_its_accuracy():
-    scene = EXTREMES["distance 0.1, at rest"]
-    spacing = 2 * np.pi / scene.numerics.points
-    # 32 sub-intervals over one spacing; the steeper potential needs more of them.
-    steep = scene.model_copy(update={"adhesion": scene.adhesion.model_copy(update={"exponents": (24, 12)})})
-    assert gap_resolution(scene, spacing) > 1 > gap_resolution(scene, spacing / 32)
-    assert gap_resolution(steep, spacing) < gap_resolution(scene, spacing)
-    assert gap_resolution(scene, 2 * spacing) == pytest.approx(2 * gap_resolution(scene, spacing))
 
 
 def test_a_scene_that_raises_does_not_hide_the_others(store):

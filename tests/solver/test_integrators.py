@@ -61,6 +61,22 @@ def final_error(method: Numerics, tolerance: float) -> tuple[float, int]:
 
 
 @every_method
+def test_it_begins_and_ends_when_told(method: Numerics) -> None:
+    numerics = method.model_copy(update={"tolerance": 1e-6})
+    stepper = integrator_for(
+        numerics, 2, lambda y: MATRIX @ y, lambda _: MATRIX, lambda y: y[:1], exact(2.0), 6.0, start=2.0
+    )
+    step = stepper.step()
+    assert step.start == 2.0
+    np.testing.assert_allclose(step.interpolate(2.0), exact(2.0), rtol=0, atol=1e-6)
+    while step.end < 6.0:
+        assert step.end > step.start
+        step = stepper.step()
+    assert step.end == 6.0
+    np.testing.assert_allclose(step.state, exact(6.0), rtol=0, atol=1e-4)
+
+
+@every_method
 def test_the_error_follows_the_tolerance(method: Numerics) -> None:
     tolerances = np.array([1e-4, 1e-6, 1e-8, 1e-10])
     errors, steps = zip(*(final_error(method, tolerance) for tolerance in tolerances), strict=True)
