@@ -66,9 +66,9 @@ class BackwardDifferentiation:
         bdf = self._bdf
         start, intended, order = bdf.t, bdf.h_abs, bdf.order
         predictor = self._predictor()
-        message = bdf.step()
+        bdf.step()
         if bdf.status == "failed":
-            raise StepFailedError(message)
+            raise StepFailedError(f"no step size suffices at time {start:g}")
         if not np.all(np.isfinite(bdf.y)):
             raise StepFailedError("the state is no longer finite")
         change = bdf.y - predictor(bdf.t)
