@@ -164,8 +164,9 @@ def condition(text: str, document: InstrumentedAttribute[Any], fields: Fields) -
     if any(_is_group(kind) for kind in kinds):
         raise StoreInputError(f"where: {path} is a group of fields; compare one of them, or {path}=null")
     if kinds <= {float, int}:
-        number = _parse(value, path, Union[tuple(kinds)])  # noqa: UP007
-        return and_(compare(element.as_float(), number), element.as_string().not_in(NON_FINITE))
+        _parse(value, path, Union[tuple(kinds)])  # noqa: UP007
+        # Compared as documents are, in double precision: SQL has no integers as long as Python's.
+        return and_(compare(element.as_float(), float(value)), element.as_string().not_in(NON_FINITE))
     if kinds == {datetime}:
         return compare(element.as_string(), timestamp_text(_parse(value, path, datetime)))
     if sign not in EQUALITIES:
