@@ -1,10 +1,13 @@
 """Certification of a converged search: both ends of its bracket are run again at finer numerics.
 
 Finer means, here and nowhere else, `POINTS_FACTOR` times as many points on a vesicle and a tolerance in time
-`TOLERANCE_FACTOR` times smaller.  An end that does not come out on its side again is moved outward, one value
-of the grid at a time and at the finer numerics, until one does: the bracket only ever widens, so it holds the
-critical value at both numerics.  Each end depends on nothing but the outcomes along its own way, hence the
-certified bracket, like that of the search, on the physics alone.
+`TOLERANCE_FACTOR` times smaller.  Where the tolerance chooses the points, the smaller one does: the numerics
+must follow from the scene alone, and not from how many points a run has ended with.
+
+An end that does not come out on its side again is moved outward, one value of the grid at a time and at the
+finer numerics, until one does: the bracket only ever widens, so it holds the critical value at both numerics.
+Each end depends on nothing but the outcomes along its own way, hence the certified bracket, like that of the
+search, on the physics alone.
 
 Pure: no MPI, no files, no clock.
 """
@@ -36,7 +39,8 @@ def finer(scene: Scene) -> Scene:
     Returns
     -------
     Scene
-        With `POINTS_FACTOR` times the points and 1/`TOLERANCE_FACTOR` of the tolerance; else the same.
+        With `POINTS_FACTOR` times the points, unless the tolerance chooses them, and 1/`TOLERANCE_FACTOR` of
+        the tolerance; else the same.
 
     Raises
     ------
@@ -44,8 +48,9 @@ def finer(scene: Scene) -> Scene:
         If that is finer than numerics can be; names the field and what it allows.
     """
     numerics = scene.numerics
+    points = numerics.points
     document = numerics.model_dump() | {
-        "points": numerics.points * POINTS_FACTOR,
+        "points": points if points == "auto" else points * POINTS_FACTOR,
         "tolerance": numerics.tolerance / TOLERANCE_FACTOR,
     }
     try:

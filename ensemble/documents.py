@@ -11,7 +11,7 @@ from ensemble.record import RunSummary
 if TYPE_CHECKING:
     from ensemble.scheduler import Traced
 
-_WORK = ("steps", "rejected_steps", "rhs_evaluations", "wall_seconds")
+_WORK = ("points", "steps", "rejected_steps", "rhs_evaluations", "wall_seconds")
 _RESULTS = (
     "outcome",
     "failure",

@@ -195,10 +195,12 @@ def _line(problem: ErrorDetails, document: Mapping[str, Any]) -> str:
 
 
 def _without_tags(location: Location, document: Mapping[str, Any]) -> Location:
-    """Drop the names of union members, which pydantic puts between a table and its fields."""
+    """Drop the names of union members, which pydantic puts after values and between tables and fields."""
     kept: list[str | int] = []
     for part in location:
         node = value_at(document, tuple(kept))
+        if isinstance(node, str | int | float):
+            break
         is_tag = isinstance(node, Mapping) and part not in node and part in node.values()
         if not is_tag:
             kept.append(part)

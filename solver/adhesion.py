@@ -16,7 +16,8 @@ from solver import scene
 from solver.adhesion_kernels import adhesion_density, adhesion_energies, adhesion_hessians
 from solver.geometry import Geometry
 from solver.proximity import Closeness
-from solver.quadrature import required_ratio
+from solver.quadrature import required_ratio, trapezoid_error
+from solver.refinement import MAXIMUM_FACTOR
 
 Array = NDArray[np.float64]
 
@@ -29,6 +30,11 @@ class Adhesion:
     parameters : scene.Adhesion
     accuracy : float
         Relative error allowed in the force between two nearly parallel membranes.
+
+    Attributes
+    ----------
+    ratio : float
+        Distance over spacing to which sources are refined for a target.
     """
 
     def __init__(self, parameters: scene.Adhesion, accuracy: float) -> None:
@@ -36,7 +42,8 @@ class Adhesion:
         self._potential = parameters.distance, m, n
         self._hamaker = parameters.hamaker
         # Over a nearly straight membrane the force kernel is like 1/(s² + d²)^(m/2 + 1).
-        self._ratio = required_ratio(0.5 * m + 1, accuracy)
+        self._order = 0.5 * m + 1
+        self.ratio = required_ratio(self._order, accuracy)
 
     def density(self, geometry: Geometry, closeness: Closeness) -> Array:
         """Force per length, (2, M, N)."""
@@ -44,22 +51,27 @@ class Adhesion:
         adhesion_density(*self._arguments(geometry, closeness), density)
         return density
 
-    def jacobian(self, geometry: Geometry, closeness: Closeness) -> tuple[Array, Array]:
-        """Derivatives of both components by the state, (M·N, state) each."""
-        size = geometry.membranes.count * geometry.membranes.points
-        hessian = np.empty((3, size, size))
+    def jacobian(self, geometry: Geometry, closeness: Closeness) -> Array:
+        """Derivative of `density` by the state, (2, M·N, state)."""
+        membranes = geometry.membranes
+        size = membranes.count * membranes.points
+        hessian = np.empty((2, size, 2, membranes.copies * size))
         adhesion_hessians(*self._arguments(geometry, closeness), hessian)
-        xx, xy, yy = hessian
-        return geometry.by_state(xx, xy), geometry.by_state(xy, yy)
+        return geometry.by_state(membranes.fold(hessian))
 
     def _arguments(self, geometry: Geometry, closeness: Closeness) -> tuple[Any, ...]:
         """What the compiled sums of forces over all pairs are given."""
         return *self._sums(geometry, closeness), self._hamaker * self._potential[1]
 
     def _sums(self, geometry: Geometry, closeness: Closeness) -> tuple[Any, ...]:
-        refinement = closeness.refinement(self._ratio)
-        return geometry.points, geometry.membranes.spacing, refinement, *self._potential
+        refinement = closeness.refinement(self.ratio)
+        return geometry.curve_points, geometry.membranes.curve_spacing, refinement, *self._potential
+
+    def sum_error(self, closeness: Closeness) -> float:
+        """Relative error of the force between the closest membranes, refined as far as it goes."""
+        return trapezoid_error(self._order, MAXIMUM_FACTOR * closeness.nearest)
 
     def energy(self, geometry: Geometry, closeness: Closeness) -> float:
         """∫∫ φ ds ds summed over all pairs."""
-        return float(self._hamaker * adhesion_energies(*self._sums(geometry, closeness)))
+        energy = adhesion_energies(*self._sums(geometry, closeness))
+        return float(geometry.membranes.copies * self._hamaker * energy)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.kernels import compiled
+from solver.compilation import compiled
 from solver.refinement import Refinement, interpolation_to, refined_points
 
 Array = NDArray[np.float64]
@@ -112,14 +112,13 @@ def adhesion_hessian(
 def adhesion_energies(
     points: Array, spacing: Array, refinement: Refinement, distance: float, m: int, n: int
 ) -> float:
-    """∫∫ (δ/r)^m − (m/n)(δ/r)^n ds ds summed over all pairs of vesicles."""
+    """∫∫ (δ/r)^m − (m/n)(δ/r)^n ds ds, half the sum over all vesicles and all other curves."""
     total = 0.0
     for g in range(refinement.groups.shape[0]):
         target, source, factor = refinement.groups[g]
         rows = refinement.rows[refinement.starts[g] : refinement.starts[g + 1]]
         fine = refined_points(points, source, factor, refinement)
         pair = adhesion_energy(points[:, target][:, rows], fine, distance, m, n)
-        # Every pair comes twice, once from either side.
         total += 0.5 * spacing[target] * spacing[source] / factor * pair
     return total
 
@@ -159,7 +158,7 @@ def adhesion_hessians(
     strength: float,
     hessian: Array,
 ) -> None:
-    """Fill the components (3, M·N, M·N) of the derivative of `adhesion_density` by the points."""
+    """Fill the derivative (2, M·N, 2, C·N) of `adhesion_density` by all curves' points."""
     size = points.shape[2]
     hessian[:] = 0.0
     for g in range(refinement.groups.shape[0]):
@@ -171,10 +170,11 @@ def adhesion_hessians(
         targets = points[:, target][:, rows]
         adhesion_hessian(targets, fine, distance, m, n, scale, pair[0], pair[1], pair[2])
         first, last = source * size, (source + 1) * size
-        for component in range(3):
+        for component, (a, b) in enumerate(((0, 0), (0, 1), (1, 1))):
             each = pair[component]
             folded = each if factor == 1 else np.dot(each, interpolation_to(refinement, factor))
             for k in range(rows.size):
                 row = target * size + rows[k]
-                hessian[component, row, first:last] = -folded[k]
-                hessian[component, row, row] += each[k].sum()
+                hessian[a, row, b, first:last] = -folded[k]
+                hessian[a, row, b, row] += each[k].sum()
+    hessian[1, :, 0] = hessian[0, :, 1]

@@ -20,24 +20,24 @@ class Bending:
         density *= -geometry.membranes.bending_modulus[:, None]
         return density
 
-    def jacobian(self, geometry: Geometry) -> tuple[Array, Array]:
-        """Derivatives of both components by the state, (M·N, state) each.
+    def jacobian(self, geometry: Geometry) -> Array:
+        """Derivative of `density` by the state, (2, M·N, state).
 
         x_s = (cos θ, sin θ), so x_ssss depends on the tangent angles directly, without the points.
         """
         membranes = geometry.membranes
         points = membranes.points
         third = differentiation(points, 3)
-        jacobian_x, jacobian_y = np.zeros((2, membranes.count * points, membranes.state_size))
+        jacobian = np.zeros((2, membranes.count * points, membranes.state_size))
         for vesicle in range(membranes.count):
             block = slice(vesicle * points, (vesicle + 1) * points)
             scale = -membranes.bending_modulus[vesicle] * (2 * np.pi / membranes.length[vesicle]) ** 3
-            np.multiply(third, -scale * geometry.tangents[1, vesicle], out=jacobian_x[block, block])
-            np.multiply(third, scale * geometry.tangents[0, vesicle], out=jacobian_y[block, block])
-        return jacobian_x, jacobian_y
+            np.multiply(third, -scale * geometry.tangents[1, vesicle], out=jacobian[0, block, block])
+            np.multiply(third, scale * geometry.tangents[0, vesicle], out=jacobian[1, block, block])
+        return jacobian
 
     def energy(self, geometry: Geometry) -> float:
         """½κ∫curvature² ds over all membranes."""
         curvature_vector = geometry.arclength_derivative(geometry.tangents)
         square = np.sum(curvature_vector**2, axis=(0, 2)) * geometry.membranes.spacing
-        return float(0.5 * np.sum(geometry.membranes.bending_modulus * square))
+        return float(0.5 * geometry.membranes.copies * np.sum(geometry.membranes.bending_modulus * square))

@@ -23,7 +23,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.kernels import compiled, logarithm
+from solver.compilation import compiled
+from solver.logarithm import logarithm
 from solver.refinement import LARGEST_REFINED, Refinement
 from solver.spectral import logarithm_weights
 
@@ -178,11 +179,9 @@ def close_stokeslets(
     spacing: float,
     correction: Array,
     differentiation: Array,
-    xx: Array,
-    xy: Array,
-    yy: Array,
+    components: Array,
 ) -> None:
-    """Fill the components (m, n) of the single-layer potential of one membrane at targets outside it.
+    """Fill the components (3, m, n) of the single-layer potential of one membrane at targets outside it.
 
     They act on point forces, as those of `kernels.stokeslets` do, and take their place where targets are
     close.  At any distance they are as accurate as the membrane and the forces are resolved, and on the
@@ -199,7 +198,7 @@ def close_stokeslets(
         `logarithm_correction`.
     differentiation : (n, n)
         `spectral.differentiation`.
-    xx, xy, yy : (m, n), written
+    components : (3, m, n), written
     """
     m, n = targets.shape[1], sources.shape[1]
     scale = 1.0 / (4.0 * np.pi)
@@ -241,9 +240,9 @@ def close_stokeslets(
             dy = points[1, start] - points[1, j]
             square = dx * dx + dy * dy if j != start else radius * radius
             isotropic = correction[start, j] - scale * (0.5 * logarithm(square) + line)
-            xx[i, j] = isotropic + 0.5 * scale * (1.0 + w.real)
-            xy[i, j] = -0.5 * scale * w.imag
-            yy[i, j] = isotropic + 0.5 * scale * (1.0 - w.real)
+            components[0, i, j] = isotropic + 0.5 * scale * (1.0 + w.real)
+            components[1, i, j] = -0.5 * scale * w.imag
+            components[2, i, j] = isotropic + 0.5 * scale * (1.0 - w.real)
 
 
 @compiled
@@ -254,13 +253,11 @@ def close_single_layer(
     refinement: Refinement,
     correction: Array,
     differentiation: Array,
-    xx: Array,
-    xy: Array,
-    yy: Array,
+    components: Array,
 ) -> None:
-    """Replace the rows (·, M·n) of targets too close for `refinement.refine_single_layer`.
+    """Replace the rows of components (3, ·, C·n) for targets too close for `refinement.refine_single_layer`.
 
-    points, tangents : (2, M, n); spacing : (M,); the rest as in `close_stokeslets`
+    points, tangents : (2, C, n); spacing : (C,); the rest as in `close_stokeslets`
     """
     n = points.shape[2]
     for g in range(refinement.groups.shape[0]):
@@ -268,8 +265,7 @@ def close_single_layer(
         if factor <= LARGEST_REFINED:
             continue
         rows = refinement.rows[refinement.starts[g] : refinement.starts[g + 1]]
-        shape = (rows.size, n)
-        close_xx, close_xy, close_yy = np.empty(shape), np.empty(shape), np.empty(shape)
+        close = np.empty((3, rows.size, n))
         close_stokeslets(
             points[:, target][:, rows],
             np.ascontiguousarray(points[:, source]),
@@ -277,12 +273,7 @@ def close_single_layer(
             spacing[source],
             correction,
             differentiation,
-            close_xx,
-            close_xy,
-            close_yy,
+            close,
         )
         for k in range(rows.size):
-            row = target * n + rows[k]
-            xx[row, source * n : (source + 1) * n] = close_xx[k]
-            xy[row, source * n : (source + 1) * n] = close_xy[k]
-            yy[row, source * n : (source + 1) * n] = close_yy[k]
+            components[:, target * n + rows[k], source * n : (source + 1) * n] = close[:, k]

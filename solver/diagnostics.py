@@ -11,10 +11,12 @@ from solver import curve, scene
 from solver.dynamics import Dynamics, Motion
 from solver.geometry import Geometry, Membranes
 from solver.orbit import Orbit
-from solver.proximity import gap
+from solver.proximity import gap, waist_error
+from solver.resolution import carried, resampled_angle, shape_tails
 from solver.rheology import adhesion_stress, membrane_stress
 from solver.run import Frames, Series
-from solver.spectral import tail
+from solver.spectral import resampled
+from solver.symmetry import independent_vesicles
 
 Array = NDArray[np.float64]
 Measure = Callable[[Motion], float]
@@ -37,14 +39,15 @@ def state_rate(membranes: Membranes, change: Array, duration: float) -> float:
 
     Zero when shapes and arrangement stay: the points glide (`gliding`), so treading does not count.
     """
-    turning, moving = membranes.tangent_angle(change), membranes.center(change)
+    turning, moving = membranes.tangent_angle(change), membranes.curve_center(change)
     relative = moving - moving.mean(axis=0)
     return float(max(np.abs(turning).max(), np.abs(relative).max()) / duration)
 
 
 def measures(setting: scene.Scene, dynamics: Dynamics) -> dict[str, Measure]:
     """The diagnostics that a scene has, by the name of their series."""
-    target_area = np.array([v.reduced_area * v.length**2 / (4 * np.pi) for v in setting.vesicles])
+    vesicles = independent_vesicles(setting)
+    target_area = np.array([v.reduced_area * v.length**2 / (4 * np.pi) for v in vesicles])
 
     found: dict[str, Measure] = {
         "bending_energy": lambda motion: dynamics.bending.energy(motion.geometry),
@@ -64,7 +67,7 @@ def measures(setting: scene.Scene, dynamics: Dynamics) -> dict[str, Measure]:
     else:
         found["inclination_angle"] = lambda motion: float(curve.inclination(motion.geometry.points[:, 0]))
     if isinstance(setting.flow, scene.Shear) and setting.flow.rate > 0:
-        scale = 1 / (setting.flow.rate * target_area.sum())
+        scale = 1 / (setting.flow.rate * dynamics.membranes.copies * target_area.sum())
         found["viscosity_bending_tension"] = lambda motion: scale * membrane_stress(motion)
         if adhesion:
             found["viscosity_adhesion"] = lambda motion: scale * adhesion_stress(motion)
@@ -75,6 +78,7 @@ class Recorder:
     """Collects diagnostics and frames."""
 
     def __init__(self, setting: scene.Scene, dynamics: Dynamics, orbit: Orbit | None) -> None:
+        self._setting = setting
         self._dynamics = dynamics
         self._orbit = orbit
         self._measures = measures(setting, dynamics)
@@ -83,6 +87,14 @@ class Recorder:
         self._previous: tuple[float, Array] | None = None
         self.values: dict[str, list[float]] = {}
         self.spatial_error = 0.0
+
+    def continue_with(self, dynamics: Dynamics) -> None:
+        """Take states of the same membranes with more points from now on."""
+        if self._previous:
+            time, state = self._previous
+            self._previous = time, carried(self._dynamics.membranes, state, dynamics.membranes)
+        self._dynamics = dynamics
+        self._measures = measures(self._setting, dynamics)
 
     def record(self, time: float, state: Array) -> None:
         """Measure a state, and keep it as a frame if one is due."""
@@ -101,11 +113,18 @@ class Recorder:
             change, duration = self._dynamics.rate_of(motion), 1.0
         self._append("state_rate", state_rate(membranes, change, duration))
         self._previous = time, state
-        tangent_angle = membranes.tangent_angle(state)
-        turned = 2 * np.pi * np.arange(membranes.points) / membranes.points
-        self.spatial_error = max(self.spatial_error, float(tail(tangent_angle - turned).max()))
+        self.spatial_error = max(self.spatial_error, *self._spatial_errors(motion, state))
         if self._frame_is_due(time):
             self._keep(time, state, motion)
+
+    def _spatial_errors(self, motion: Motion, state: Array) -> list[float]:
+        """Of the shapes, across waists, and of adhesion at the smallest gap."""
+        tails, waists = shape_tails(self._dynamics.membranes, state), waist_error(motion.geometry)
+        errors = [float(tails.max()), float(waists.max())]
+        adhesion = self._dynamics.adhesion
+        if adhesion and motion.closeness:
+            errors.append(adhesion.sum_error(motion.closeness))
+        return errors
 
     def finish(self, time: float, state: Array) -> None:
         """Measure the last state, unless it is recorded already, and keep it as a frame."""
@@ -116,7 +135,10 @@ class Recorder:
 
     def _keep(self, time: float, state: Array, motion: Motion) -> None:
         membranes = self._dynamics.membranes
-        self._frames.append((time, membranes.tangent_angle(state), membranes.center(state), motion.tension))
+        tension = np.tile(motion.tension, (membranes.copies, 1))
+        self._frames.append(
+            (time, membranes.curve_tangent_angle(state), membranes.curve_center(state), tension)
+        )
 
     def _append(self, name: str, value: float) -> None:
         self.values.setdefault(name, []).append(value)
@@ -137,4 +159,10 @@ class Recorder:
     def frames(self) -> Frames:
         """All recorded states."""
         time, tangent_angle, center, tension = zip(*self._frames, strict=True)
-        return Frames(np.array(time), np.array(tangent_angle), np.array(center), np.array(tension))
+        points = self._dynamics.membranes.points
+        return Frames(
+            np.array(time),
+            np.array([resampled_angle(angle, points) for angle in tangent_angle]),
+            np.array(center),
+            np.array([resampled(values, points) for values in tension]),
+        )

@@ -19,14 +19,19 @@ from solver.adhesion import Adhesion
 from solver.bending import Bending
 from solver.flow import ImposedFlow, imposed_flow
 from solver.geometry import Geometry, Membranes
-from solver.gliding import glide, gliding_direction, gliding_speed
+from solver.gliding import glide, gliding_direction, gliding_speed, gliding_speed_by_curvature
 from solver.proximity import Closeness
-from solver.scene import Scene
+from solver.scene import Numerics, Scene
 from solver.spectral import differentiation, highest_modes, integration
 from solver.stokes import SingleLayer
-from solver.tension import Inextensibility
+from solver.tension import ROUND_OFF, Inextensibility
 
 Array = NDArray[np.float64]
+
+
+def accuracy_of(numerics: Numerics) -> float:
+    """Of sums and iterations; so far below the time integrator's that they do not limit its step."""
+    return float(np.clip(1e-3 * numerics.tolerance, 1e-12, 1e-7))
 
 
 @dataclass(frozen=True)
@@ -65,16 +70,15 @@ class Dynamics:
     @classmethod
     def of(cls, scene: Scene) -> Self:
         """The terms of a scene."""
-        membranes = Membranes.of(scene.vesicles, scene.numerics.points)
-        several = membranes.count > 1
-        # Of sums and iterations; so far below the time integrator's that they do not limit its step.
-        accuracy = float(np.clip(1e-3 * scene.numerics.tolerance, 1e-12, 1e-7))
+        membranes = Membranes.of_scene(scene)
+        several = membranes.curves > 1
+        accuracy = accuracy_of(scene.numerics)
         return cls(
             membranes=membranes,
             bending=Bending(),
             adhesion=Adhesion(scene.adhesion, accuracy) if scene.adhesion and several else None,
-            flow=imposed_flow(scene.flow) if scene.flow else None,
-            inextensibility=Inextensibility(accuracy),
+            flow=imposed_flow(scene.flow, membranes) if scene.flow else None,
+            inextensibility=Inextensibility(accuracy, 1e-3 * accuracy if several else ROUND_OFF),
             layer=SingleLayer(membranes, accuracy),
         )
 
@@ -111,37 +115,27 @@ class Dynamics:
     def jacobian(self, state: Array) -> Array:
         """Derivative of `rate`, (state_size, state_size).
 
-        Dropped is only the change of the gliding direction with the curvature, and that of a refined
-        quadrature with the points.
+        Dropped is only the change of a refined quadrature with the points.
         """
         motion = self.motion(state)
         geometry = motion.geometry
-        force_x, force_y = self.bending.jacobian(geometry)
-        self._add_tension_turning(motion, force_x, force_y)
+        force = self.bending.jacobian(geometry)
+        self._add_tension_turning(motion, force)
         if self.adhesion and motion.closeness:
-            adhesion_x, adhesion_y = self.adhesion.jacobian(geometry, motion.closeness)
-            force_x += adhesion_x
-            force_y += adhesion_y
+            force += self.adhesion.jacobian(geometry, motion.closeness)
         weights = np.repeat(self.membranes.spacing, self.membranes.points)[:, None]
-        force_x *= weights
-        force_y *= weights
-        ux, uy = self.layer.columns(force_x, force_y)
-        layer_x, layer_y = self.layer.jacobian(geometry, self._point_forces(motion))
-        ux += layer_x
-        uy += layer_y
+        force *= weights
+        velocity = self.layer.columns(force)
+        velocity += self.layer.jacobian(geometry, self._point_forces(motion))
         if self.flow:
-            flow_x, flow_y = self.flow.jacobian(*self._point_derivatives(geometry))
-            ux += flow_x
-            uy += flow_y
-        stretching = self.inextensibility.stretching(geometry, ux, uy)
+            velocity += self.flow.jacobian(self._point_derivatives(geometry))
+        stretching = self.inextensibility.stretching(geometry, velocity)
         every_point = np.arange(motion.turning.size)
         stretching[every_point, every_point] += motion.turning.ravel()
         stretching *= weights
-        inverse, tension_x, tension_y = self.inextensibility.factorize(self.layer, geometry)
-        tension = inverse @ stretching
-        ux += tension_x @ tension
-        uy += tension_y @ tension
-        return self._rate_columns(motion, ux, uy)
+        inverse, tension_flow = self.inextensibility.factorize(self.layer, geometry)
+        velocity += tension_flow @ (inverse @ stretching)
+        return self._rate_columns(motion, velocity)
 
     def _point_forces(self, motion: Motion) -> Array:
         """All forces at the points, (2, M, N)."""
@@ -151,7 +145,7 @@ class Dynamics:
             density += motion.adhesion
         return density * self.membranes.spacing[:, None]
 
-    def _add_tension_turning(self, motion: Motion, force_x: Array, force_y: Array) -> None:
+    def _add_tension_turning(self, motion: Motion, force: Array) -> None:
         """Add what turning a membrane does to its tension's force, ∂/∂s (σ n δθ)."""
         points = self.membranes.points
         matrix = differentiation(points)
@@ -160,48 +154,46 @@ class Dynamics:
             block = slice(vesicle * points, (vesicle + 1) * points)
             scaled = motion.tension[vesicle] * (2 * np.pi / self.membranes.length[vesicle])
             tx, ty = geometry.tangents[:, vesicle]
-            force_x[block, block] -= matrix * (scaled * ty)
-            force_y[block, block] += matrix * (scaled * tx)
+            force[0, block, block] -= matrix * (scaled * ty)
+            force[1, block, block] += matrix * (scaled * tx)
 
     def _assemble(self, state: Array) -> tuple[Geometry, Closeness | None]:
         geometry = Geometry(self.membranes, state)
-        closeness = Closeness(geometry) if self.membranes.count > 1 else None
+        closeness = Closeness(geometry) if self.membranes.curves > 1 else None
         self.layer.assemble(geometry, closeness)
         return geometry, closeness
 
-    def _point_derivatives(self, geometry: Geometry) -> tuple[Array, Array]:
-        """Derivatives of the points' coordinates by the state, (M·N, state) each."""
+    def _point_derivatives(self, geometry: Geometry) -> Array:
+        """Derivatives of the points by the state, (2, M·N, state)."""
         count, points = self.membranes.count, self.membranes.points
-        dx, dy = np.zeros((2, count * points, self.membranes.state_size))
+        by_state = np.zeros((2, count * points, self.membranes.state_size))
         matrix = integration(points)
         for vesicle in range(count):
             block = slice(vesicle * points, (vesicle + 1) * points)
             scale = self.membranes.length[vesicle] / (2 * np.pi)
-            np.multiply(matrix, -scale * geometry.tangents[1, vesicle], out=dx[block, block])
-            np.multiply(matrix, scale * geometry.tangents[0, vesicle], out=dy[block, block])
-            dx[block, count * points + vesicle] = 1.0
-            dy[block, count * points + count + vesicle] = 1.0
-        return dx, dy
+            np.multiply(matrix, -scale * geometry.tangents[1, vesicle], out=by_state[0, block, block])
+            np.multiply(matrix, scale * geometry.tangents[0, vesicle], out=by_state[1, block, block])
+            by_state[0, block, count * points + vesicle] = 1.0
+            by_state[1, block, count * points + count + vesicle] = 1.0
+        return by_state
 
-    def _rate_columns(self, motion: Motion, ux: Array, uy: Array) -> Array:
-        """`rate_of` for velocity components (M·N, columns), the derivatives of the velocity by the state."""
+    def _rate_columns(self, motion: Motion, velocity: Array) -> Array:
+        """`rate_of` for the derivatives of the velocity by the state, (2, M·N, columns)."""
         count, points = self.membranes.count, self.membranes.points
         geometry = motion.geometry
-        result = np.empty((self.membranes.state_size, ux.shape[1]))
-        tx, ty = geometry.tangents.reshape(2, -1, 1)
-        turning = result[: count * points]
-        np.multiply(tx, geometry.column_derivative(uy), out=turning)
-        turning -= ty * geometry.column_derivative(ux)
+        result = np.empty((self.membranes.state_size, velocity.shape[2]))
+        gradient = geometry.column_derivative(velocity)
+        gradient *= geometry.normals.reshape(2, -1, 1)
+        np.sum(gradient, axis=0, out=result[: count * points])
         curvature, highest = geometry.curvature, highest_modes(points)
         direction, gliding = gliding_direction(curvature), gliding_speed(curvature, motion.turning)
+        by_curvature = gliding_speed_by_curvature(curvature, motion.turning)
         for vesicle in range(count):
             block = slice(vesicle * points, (vesicle + 1) * points)
             result[block] += np.outer(curvature[vesicle], direction[vesicle] @ result[block])
-            result[block, block] += (
-                gliding[vesicle] * self.membranes.wavenumber[vesicle] * differentiation(points)
-            )
+            to_curvature = self.membranes.wavenumber[vesicle] * differentiation(points)
+            result[block, block] += gliding[vesicle] * to_curvature
+            result[block, block] += np.outer(curvature[vesicle], by_curvature[vesicle] @ to_curvature)
             result[block] -= highest @ (highest.T @ result[block])
-        for component, velocity in enumerate((ux, uy)):
-            first = (points + component) * count
-            result[first : first + count] = velocity.reshape(count, points, -1).mean(axis=1)
+        result[count * points :] = velocity.reshape(2 * count, points, -1).mean(axis=1)
         return result

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver import scene
-from solver.geometry import Geometry
+from solver.geometry import Geometry, Membranes
 
 Array = NDArray[np.float64]
 
@@ -22,8 +22,8 @@ class ImposedFlow(Protocol):
     def velocity(self, geometry: Geometry) -> Array:
         """Velocity at the membranes' points, (2, M, N)."""
 
-    def jacobian(self, dx: Array, dy: Array) -> tuple[Array, Array]:
-        """Derivatives of both velocity components, given those of the points, each (MN, state)."""
+    def jacobian(self, by_state: Array) -> Array:
+        """Derivatives of the velocity, given those of the points, (2, M·N, state) each."""
 
 
 class LinearFlow:
@@ -37,10 +37,9 @@ class LinearFlow:
         points = geometry.points
         return (self.gradient @ points.reshape(2, -1)).reshape(points.shape)
 
-    def jacobian(self, dx: Array, dy: Array) -> tuple[Array, Array]:
+    def jacobian(self, by_state: Array) -> Array:
         """See `ImposedFlow`."""
-        (xx, xy), (yx, yy) = self.gradient
-        return xx * dx + xy * dy, yx * dx + yy * dy
+        return np.tensordot(self.gradient, by_state, axes=1)
 
 
 class TrapFlow:
@@ -54,20 +53,20 @@ class TrapFlow:
         stagnation = geometry.centers.mean(axis=1)
         return self.linear.velocity(geometry) - (self.linear.gradient @ stagnation)[:, None, None]
 
-    def jacobian(self, dx: Array, dy: Array) -> tuple[Array, Array]:
+    def jacobian(self, by_state: Array) -> Array:
         """See `ImposedFlow`.
 
         The points' derivatives have the centers' as their mean, so the mean over all points is that of X.
         """
-        return self.linear.jacobian(dx - dx.mean(axis=0), dy - dy.mean(axis=0))
+        return self.linear.jacobian(by_state - by_state.mean(axis=1, keepdims=True))
 
 
-def imposed_flow(flow: scene.Shear | scene.Extension | scene.Trap) -> ImposedFlow:
+def imposed_flow(flow: scene.Shear | scene.Extension | scene.Trap, membranes: Membranes) -> ImposedFlow:
     """The flow that a scene asks for."""
     match flow:
         case scene.Shear():
             return LinearFlow(flow.rate * _SHEAR)
-        case scene.Extension():
-            return LinearFlow(flow.rate * _EXTENSION)
-        case scene.Trap():
+        case scene.Trap() if membranes.copies == 1:
             return TrapFlow(flow.rate * _EXTENSION)
+        case scene.Extension() | scene.Trap():  # vesicles and their images have the origin as their mean
+            return LinearFlow(flow.rate * _EXTENSION)

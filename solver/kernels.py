@@ -1,139 +1,99 @@
-"""Pairwise sums over membrane points, compiled.
-
-Every function here is a plain double loop whose inner loop LLVM turns into SIMD code.  That needs two
-things: ``error_model="numpy"`` (no branch for a division by zero) and a logarithm without a call, computed
-from the number's bits.
-"""
+"""Sums over pairs of membrane points, compiled."""
 
 from __future__ import annotations
 
-from functools import partial
-from typing import Any
-
 import numpy as np
-from llvmlite import ir
-from numba import njit, types
-from numba.extending import intrinsic
 from numpy.typing import NDArray
+
+from solver.compilation import compiled, widest_vectors
+from solver.logarithm import LOGARITHM_UNIT, logarithm_and_reciprocal
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-# Without "ninf" and "nnan": a run that diverges must show it.
-compiled = partial(
-    njit, cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz", "arcp"}
-)
-
-
-@intrinsic
-def _bits_of(typing_context: Any, value: Any) -> Any:
-    """The 64 bits of a double, as an integer."""
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return builder.bitcast(arguments[0], ir.IntType(64))
-
-    return types.int64(types.float64), generate
-
-
-@intrinsic
-def _double_of(typing_context: Any, bits: Any) -> Any:
-    """The double with these 64 bits."""
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return builder.bitcast(arguments[0], ir.DoubleType())
-
-    return types.float64(types.int64), generate
-
-
-_LN2 = float(np.log(2.0))
-_MANTISSA = (1 << 52) - 1
-_SQRT_HALF_BITS = 0x3FE6A09E667F3BCD
-
-
-@compiled(inline="always")
-def logarithm(x: float) -> float:
-    """Natural logarithm of a positive normal double, to 3e-16.
-
-    x = 2^e·m with m in [√½, √2); log m = 2 artanh(z), z = (m−1)/(m+1), as an odd polynomial: |z| ≤ 0.1716,
-    so the first term left out, 2 z²¹/21, is below 1e-17.
-    """
-    shifted = _bits_of(x) - _SQRT_HALF_BITS
-    exponent = shifted >> 52
-    mantissa = _double_of((shifted & _MANTISSA) + _SQRT_HALF_BITS)
-    z = (mantissa - 1.0) / (mantissa + 1.0)
-    w = z * z
-    series = 1 / 19.0
-    series = series * w + 1 / 17.0
-    series = series * w + 1 / 15.0
-    series = series * w + 1 / 13.0
-    series = series * w + 1 / 11.0
-    series = series * w + 1 / 9.0
-    series = series * w + 1 / 7.0
-    series = series * w + 1 / 5.0
-    series = series * w + 1 / 3.0
-    return exponent * _LN2 + (2.0 * z + 2.0 * z * w * series)
-
 
 @compiled
-def stokeslets(targets: Array, sources: Array, xx: Array, xy: Array, yy: Array) -> None:
-    """Fill the components (m, n) of (−log r I + r⊗r/r²)/4π from ``sources`` (2, n) to ``targets`` (2, m).
+def stokeslets(targets: Array, sources: Array, components: Array) -> None:
+    """Fill the components xx, xy, yy (3, m, n) of (−log r I + r⊗r/r²)/4π between points.
 
-    Where a target is its own source the entries are meaningless and the caller's to overwrite.
+    ``targets`` are (2, m), ``sources`` (2, n).  Where a target is its own source the entries are meaningless
+    and the caller's to overwrite.
     """
-    scale = 1.0 / (4.0 * np.pi)
+    widest_vectors()
+    radial = 1.0 / (4.0 * np.pi)
+    isotropic = -0.5 * LOGARITHM_UNIT * radial
+    source_x, source_y = sources[0], sources[1]
     for i in range(targets.shape[1]):
         xi, yi = targets[0, i], targets[1, i]
-        for j in range(sources.shape[1]):
-            dx = xi - sources[0, j]
-            dy = yi - sources[1, j]
-            r2 = dx * dx + dy * dy
-            inverse = scale / r2
-            isotropic = -0.5 * scale * logarithm(r2)
-            xx[i, j] = isotropic + dx * dx * inverse
-            xy[i, j] = dx * dy * inverse
-            yy[i, j] = isotropic + dy * dy * inverse
+        # As rows: indexed in three dimensions the loop is not turned into SIMD code.
+        xx, xy, yy = components[0, i], components[1, i], components[2, i]
+        for j in range(source_x.size):
+            dx = xi - source_x[j]
+            dy = yi - source_y[j]
+            logarithm, reciprocal = logarithm_and_reciprocal(dx * dx + dy * dy)
+            inverse = radial * reciprocal
+            diagonal = isotropic * logarithm
+            xx[j] = diagonal + dx * dx * inverse
+            xy[j] = dx * dy * inverse
+            yy[j] = diagonal + dy * dy * inverse
 
 
 @compiled
-def complete_self_part(
-    correction: Array, diagonal: float, tangents: Array, first: int, xx: Array, xy: Array, yy: Array
-) -> None:
-    """Turn point Stokeslets of one closed curve on itself into its single-layer quadrature.
+def complete_self_parts(correction: Array, diagonal: Array, tangents: Array, components: Array) -> None:
+    """Turn point Stokeslets of closed curves on themselves into their single-layer quadrature.
 
     Parameters
     ----------
     correction : (n, n)
         What Kress's rule adds off the diagonal (`close_evaluation.logarithm_correction`).
-    diagonal : float
+    diagonal : (M,)
         The whole logarithmic part on the diagonal, over 4π.
-    tangents : (2, n)
-    first : int
-        Where the curve's rows and columns begin in the components.
+    tangents : (2, M, n)
+    components : (3, M·n, ·)
+        Of `stokeslets`; the sources begin with the targets.
     """
     scale = 1.0 / (4.0 * np.pi)
-    n = tangents.shape[1]
-    for i in range(n):
-        row = first + i
-        for j in range(n):
-            xx[row, first + j] += correction[i, j]
-        for j in range(n):
-            yy[row, first + j] += correction[i, j]
-        tx, ty = tangents[0, i], tangents[1, i]
-        xx[row, row] = diagonal + scale * tx * tx
-        xy[row, row] = scale * tx * ty
-        yy[row, row] = diagonal + scale * ty * ty
+    n = tangents.shape[2]
+    for vesicle in range(tangents.shape[1]):
+        first = vesicle * n
+        for i in range(n):
+            row = first + i
+            for j in range(n):
+                components[0, row, first + j] += correction[i, j]
+            for j in range(n):
+                components[2, row, first + j] += correction[i, j]
+            tx, ty = tangents[0, vesicle, i], tangents[1, vesicle, i]
+            components[0, row, row] = diagonal[vesicle] + scale * tx * tx
+            components[1, row, row] = scale * tx * ty
+            components[2, row, row] = diagonal[vesicle] + scale * ty * ty
 
 
 @compiled
-def stokeslet_derivatives(points: Array, forces: Array, xx: Array, xy: Array, yx: Array, yy: Array) -> None:
-    """Fill the derivatives of the velocity at each of ``points`` (2, n) by all of them, (n, n) each.
+def join_components(components: Array, matrix: Array) -> None:
+    """Write the components (3, m, n) into one matrix (2m, 2m).
+
+    Columns beyond m belong to images, on which forces are opposite.
+    """
+    m = components.shape[1]
+    for block, component in ((0, 0), (1, 1), (2, 1), (3, 2)):
+        row, column = block // 2 * m, block % 2 * m
+        for i in range(m):
+            for j in range(m):
+                matrix[row + i, column + j] = components[component, i, j]
+            for image in range(m, components.shape[2]):
+                matrix[row + i, column + image - m] -= components[component, i, image]
+
+
+@compiled
+def stokeslet_derivatives(points: Array, forces: Array, by_points: Array) -> None:
+    """Fill the derivatives (2, m, 2, n) of the velocity at the first m of ``points`` (2, n) by all of them.
 
     The velocity is the sum of Stokeslets of strength ``forces`` (2, n) at the points; with r = x − y and
     g = F·r, moving r by δ changes one of them by
-    [−F (r·δ) + r (F·δ) + g δ − 2 g r (r·δ)/r²]/(4π r²).  ``xy`` is that of x-velocity by y, and so on.
+    [−F (r·δ) + r (F·δ) + g δ − 2 g r (r·δ)/r²]/(4π r²).
     """
     scale = 1.0 / (4.0 * np.pi)
-    for i in range(points.shape[1]):
+    for i in range(by_points.shape[1]):
         xi, yi = points[0, i], points[1, i]
         for j in range(points.shape[1]):
             dx = xi - points[0, j]
@@ -143,14 +103,13 @@ def stokeslet_derivatives(points: Array, forces: Array, xx: Array, xy: Array, yx
             inverse = scale / (r2 if r2 > 0.0 else np.inf)
             along = dx * fx + dy * fy
             pull = 2.0 * along * inverse * inverse * (1.0 / scale)
-            xx[i, j] = -along * inverse + pull * dx * dx
-            xy[i, j] = (fx * dy - dx * fy) * inverse + pull * dx * dy
-            yx[i, j] = (fy * dx - dy * fx) * inverse + pull * dx * dy
-            yy[i, j] = -along * inverse + pull * dy * dy
-        xx[i, i] = -(xx[i].sum() - xx[i, i])
-        xy[i, i] = -(xy[i].sum() - xy[i, i])
-        yx[i, i] = -(yx[i].sum() - yx[i, i])
-        yy[i, i] = -(yy[i].sum() - yy[i, i])
+            by_points[0, i, 0, j] = -along * inverse + pull * dx * dx
+            by_points[0, i, 1, j] = (fx * dy - dx * fy) * inverse + pull * dx * dy
+            by_points[1, i, 0, j] = (fy * dx - dy * fx) * inverse + pull * dx * dy
+            by_points[1, i, 1, j] = -along * inverse + pull * dy * dy
+        for component in range(2):
+            for coordinate in range(2):
+                by_points[component, i, coordinate, i] -= by_points[component, i, coordinate].sum()
 
 
 @compiled
@@ -177,12 +136,30 @@ def distances(targets: Array, sources: Array, tangents: Array, spacing: float, o
 
 
 @compiled
-def pair_distances(points: Array, tangents: Array, spacing: Array, out: Array) -> None:
-    """`distances` for all ordered pairs: out[a, b, i] is that of point i of vesicle a to vesicle b.
+def waists(points: Array) -> Array:
+    """Smallest distance (M,) between points (2, M, n) of a curve that lie at least an eighth of it apart."""
+    count, n = points.shape[1], points.shape[2]
+    out = np.empty(count)
+    apart = n // 8
+    for vesicle in range(count):
+        nearest = np.inf
+        for i in range(n):
+            for j in range(i + apart, min(n, i + n - apart + 1)):
+                dx = points[0, vesicle, i] - points[0, vesicle, j]
+                dy = points[1, vesicle, i] - points[1, vesicle, j]
+                nearest = min(nearest, dx * dx + dy * dy)
+        out[vesicle] = np.sqrt(nearest)
+    return out
 
-    points, tangents : (2, M, N); spacing : (M,); out : (M, M, N), its diagonal left alone
+
+@compiled
+def pair_distances(points: Array, tangents: Array, spacing: Array, count: int) -> Array:
+    """`distances` for all ordered pairs: [a, b, i] is that of point i of curve a < ``count`` to curve b.
+
+    points, tangents : (2, C, N); spacing : (C,); returns (count, C, N), infinite from a curve to itself
     """
-    for target in range(points.shape[1]):
+    out = np.full((count, points.shape[1], points.shape[2]), np.inf)
+    for target in range(count):
         for source in range(points.shape[1]):
             if target != source:
                 distances(
@@ -192,3 +169,4 @@ def pair_distances(points: Array, tangents: Array, spacing: Array, out: Array) -
                     spacing[source],
                     out[target, source],
                 )
+    return out

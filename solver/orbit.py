@@ -13,6 +13,8 @@ from solver.integrators import Step
 
 Array = NDArray[np.float64]
 
+_FARTHER = 1.5
+
 
 class Orbit:
     """Follows the line of centers from step to step.
@@ -22,28 +24,30 @@ class Orbit:
     angle, distance : float
         At the end of the last step; the angle (radians) is unwrapped.
     separated : bool
-        Whether the distance has passed the separated distance, growing.
+        Whether the distance has passed the separated distance, or half as much again as at the start if that
+        is farther.
     half_turns : list of float
         ``half_turns[k]`` is when the line had first turned by kπ from its start, either way.
+    membranes : Membranes
+        Those of the steps; others may take their place.
     """
 
     def __init__(self, membranes: Membranes, state: Array, separated_distance: float) -> None:
-        self._membranes = membranes
-        self._separated_distance = separated_distance
+        self.membranes = membranes
         offset = self._offset(state)
         self.angle = self._start = float(np.arctan2(offset[1], offset[0]))
         self.distance = float(np.hypot(*offset))
+        self._separated_distance = max(separated_distance, _FARTHER * self.distance)
         self.separated = False
         self.half_turns = [0.0]
 
     def advance(self, step: Step) -> Step:
         """Follow one step, but no farther than to separation; return the part followed."""
-        if self.distance_of(step.state) >= max(self._separated_distance, self.distance):
+        if self.distance_of(step.state) >= self._separated_distance:
             self.separated = True
-            if self.distance < self._separated_distance:
-                step = step.until(
-                    self._crossing(step, lambda state: self.distance_of(state) - self._separated_distance)
-                )
+            step = step.until(
+                self._crossing(step, lambda state: self.distance_of(state) - self._separated_distance)
+            )
         distance = self.distance_of(step.state)
         angle = self.angle_of(step.state)
         while abs(angle - self._start) >= len(self.half_turns) * np.pi:
@@ -67,7 +71,7 @@ class Orbit:
         return self.half_turns[-1] - self.half_turns[-3] if len(self.half_turns) > 2 else None
 
     def _offset(self, state: Array) -> Array:
-        first, second = self._membranes.center(state)
+        first, second = self.membranes.curve_center(state)
         return np.asarray(second - first)
 
     def _excess_turn(self, state: Array) -> float:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.geometry import Geometry
-from solver.kernels import pair_distances
+from solver.kernels import pair_distances, waists
 from solver.refinement import MAXIMUM_FACTOR, Refinement, group_targets
 from solver.spectral import interpolation, interpolations
 
@@ -18,33 +18,49 @@ class Closeness:
 
     Attributes
     ----------
-    distances : (M, M, N)
+    distances : (M, C, N)
         Distance over the source's spacing, by target, source and point of the target.
+    nearest : float
+        The smallest of them.
     """
 
     def __init__(self, geometry: Geometry) -> None:
         membranes = geometry.membranes
         self._points = membranes.points
-        self.distances = np.full((membranes.count, membranes.count, membranes.points), np.inf)
-        pair_distances(geometry.points, geometry.tangents, membranes.spacing, self.distances)
-        self.distances /= membranes.spacing[:, None]
-        self._nearest = float(self.distances.min())
+        spacing = membranes.curve_spacing
+        self.distances = pair_distances(
+            geometry.curve_points, geometry.curve_tangents, spacing, membranes.count
+        )
+        self.distances /= spacing[:, None]
+        self.nearest = float(self.distances.min())
 
     def refinement(self, ratio: float) -> Refinement:
         """The refinement that brings every target to ``ratio`` spacings of every source."""
         factor = 1
-        while factor < MAXIMUM_FACTOR and factor * self._nearest < ratio:
+        while factor < MAXIMUM_FACTOR and factor * self.nearest < ratio:
             factor *= 2
         groups, rows, starts = group_targets(self.distances, ratio)
         return Refinement(groups, rows, starts, interpolations(self._points, factor))
+
+
+def waist_error(geometry: Geometry) -> Array:
+    """Relative error (M,) of the single layer across each vesicle's own waist.
+
+    There the trapezoid rule, with the logarithm of the neighborhood split off, errs as on another membrane
+    (`quadrature`), and nothing is refined.
+    """
+    waist = waists(geometry.points)
+    return np.asarray(2 * np.exp(-2 * np.pi * waist / geometry.membranes.spacing))
 
 
 def gap(geometry: Geometry, refinement: int = 4) -> float:
     """Smallest distance between two different membranes, seen at ``refinement`` times as many points."""
     membranes = geometry.membranes
     matrix = interpolation(membranes.points, refinement).T
-    distance = np.full((membranes.count, membranes.count, refinement * membranes.points), np.inf)
-    pair_distances(
-        geometry.points @ matrix, geometry.tangents @ matrix, membranes.spacing / refinement, distance
+    distances = pair_distances(
+        geometry.curve_points @ matrix,
+        geometry.curve_tangents @ matrix,
+        membranes.curve_spacing / refinement,
+        membranes.count,
     )
-    return float(distance.min())
+    return float(distances.min())

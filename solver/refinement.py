@@ -11,7 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.kernels import compiled, stokeslets
+from solver.compilation import compiled
+from solver.kernels import stokeslets
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -24,8 +25,8 @@ class Refinement(NamedTuple):
     """Which targets see which vesicle at which factor.
 
     groups : (k, 3)
-        Target vesicle, source vesicle and factor of each group of targets; every target is in exactly one
-        group of every other vesicle.
+        Target vesicle, source curve and factor of each group of targets; every target is in exactly one
+        group of every other curve.
     rows, starts : (·,), (k + 1,)
         ``rows[starts[g]:starts[g + 1]]`` are the points of group g within their vesicle.
     interpolations : (·, n)
@@ -52,16 +53,16 @@ def refinement_factors(distance_per_spacing: Array, ratio: float) -> Indices:
 def group_targets(distances: Array, ratio: float) -> tuple[Indices, Indices, Indices]:
     """Make the groups, rows and starts of `Refinement`.
 
-    distances : (M, M, n)
-        Distance over spacing, by target vesicle, source vesicle and point of the target.
+    distances : (M, C, n)
+        Distance over spacing, by target vesicle, source curve and point of the target.
     """
-    count, n = distances.shape[0], distances.shape[2]
+    count, curves, n = distances.shape
     groups = [(0, 0, 0)][:0]
-    rows = np.empty(count * (count - 1) * n, dtype=np.int64)
+    rows = np.empty(count * (curves - 1) * n, dtype=np.int64)
     starts = [0]
     used = 0
     for target in range(count):
-        for source in range(count):
+        for source in range(curves):
             if target == source:
                 continue
             factors = refinement_factors(distances[target, source], ratio)
@@ -89,16 +90,16 @@ def interpolation_to(refinement: Refinement, factor: int) -> Array:
 
 @compiled
 def refined_points(points: Array, source: int, factor: int, refinement: Refinement) -> Array:
-    """Points (2, factor·n) of one of the vesicles ``points`` (2, M, n)."""
+    """Points (2, factor·n) of one of the curves ``points`` (2, C, n)."""
     coarse = np.ascontiguousarray(points[:, source])
     return coarse if factor == 1 else np.dot(coarse, interpolation_to(refinement, factor).T)
 
 
 @compiled
-def refine_single_layer(points: Array, refinement: Refinement, xx: Array, xy: Array, yy: Array) -> None:
-    """Replace the rows (·, M·n) of targets that need a factor of 2 or 4, folding refined columns back.
+def refine_single_layer(points: Array, refinement: Refinement, components: Array) -> None:
+    """Replace the rows of components (3, ·, C·n) for targets that need a factor of 2 or 4.
 
-    For closer ones `close_evaluation` costs less.
+    Refined columns are folded back.  For closer targets `close_evaluation` costs less.
     """
     n = points.shape[2]
     for g in range(refinement.groups.shape[0]):
@@ -107,14 +108,10 @@ def refine_single_layer(points: Array, refinement: Refinement, xx: Array, xy: Ar
             continue
         rows = refinement.rows[refinement.starts[g] : refinement.starts[g + 1]]
         fine = refined_points(points, source, factor, refinement)
-        shape = (rows.size, fine.shape[1])
-        fine_xx, fine_xy, fine_yy = np.empty(shape), np.empty(shape), np.empty(shape)
-        stokeslets(points[:, target][:, rows], fine, fine_xx, fine_xy, fine_yy)
-        fold = interpolation_to(refinement, factor)
-        folded_xx, folded_xy, folded_yy = np.dot(fine_xx, fold), np.dot(fine_xy, fold), np.dot(fine_yy, fold)
-        first, last = source * n, (source + 1) * n
-        for k in range(rows.size):
-            row = target * n + rows[k]
-            xx[row, first:last] = folded_xx[k] / factor
-            xy[row, first:last] = folded_xy[k] / factor
-            yy[row, first:last] = folded_yy[k] / factor
+        refined = np.empty((3, rows.size, fine.shape[1]))
+        stokeslets(points[:, target][:, rows], fine, refined)
+        for component in range(3):
+            folded = np.dot(refined[component], interpolation_to(refinement, factor))
+            for k in range(rows.size):
+                row = target * n + rows[k]
+                components[component, row, source * n : (source + 1) * n] = folded[k] / factor

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 def shear_stress(geometry: Geometry, density: Array) -> float:
     """−∫ f_x y ds of a force density (2, M, N) over all membranes."""
     moment = np.sum(density[0] * geometry.points[1], axis=1)
-    return float(-np.sum(moment * geometry.membranes.spacing))
+    return float(-geometry.membranes.copies * np.sum(moment * geometry.membranes.spacing))
 
 
 def membrane_stress(motion: Motion) -> float:

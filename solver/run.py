@@ -43,6 +43,9 @@ class Energy:
     adhesion: float | None
 
 
+LARGEST_SPATIAL = 1e-3
+
+
 @dataclass(frozen=True)
 class Errors:
     """Measured error indicators, worst over the run.
@@ -50,7 +53,9 @@ class Errors:
     area : relative drift of a vesicle's area.
     closure : |∫(cos θ, sin θ) ds| / length.
     temporal : accumulated local error of the state.
-    spatial : amplitude (radians) of the last third of the tangent angle's spectrum.
+    spatial : the largest of these: amplitude (radians) of the last third of the tangent angle's spectrum;
+        relative error of the single layer across a vesicle's waist; that of adhesion at the smallest gap.
+        Beyond `LARGEST_SPATIAL` the points do not resolve the scene.
     """
 
     area: float
@@ -70,6 +75,7 @@ class Work:
     factorizations: int
     wall_seconds: float
     smallest_step: float | None = None  # accepted, in time; None if none was taken
+    points: int | None = None  # on each vesicle at the end; None in records from before it could change
 
 
 # Diagnostics by name, each of shape (time,) and sampled at `Series["time"]`.  Always present: time,
@@ -82,7 +88,7 @@ Series = Mapping[str, Array]
 
 @dataclass(frozen=True)
 class Frames:
-    """Recorded states.
+    """Recorded states, all with as many points as the last one.
 
     time : (frames,)
     tangent_angle : (frames, vesicles, points)

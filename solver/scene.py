@@ -105,9 +105,10 @@ class Start(Model):
 class Numerics(Model):
     """Resolution in space and time."""
 
-    points: int = Field(64, ge=16, le=1024, multiple_of=2)  # on each vesicle
+    # On each vesicle; "auto": as many as the tolerance needs, and more when a run comes to need them.
+    points: Annotated[int, Field(ge=16, le=1024, multiple_of=2)] | Literal["auto"] = 64
     tolerance: float = Field(1e-4, ge=1e-12, le=0.1)  # local error of tangent angle and center, absolute
-    integrator: Literal["bdf", "sdc", "imex-euler"] = "bdf"
+    integrator: Literal["auto", "bdf", "rosenbrock", "sdc", "imex-euler"] = "auto"
     order: int | None = Field(None, ge=2, le=8)  # of "sdc"; None: its usual one
     # By the estimated error of each step, or as the paper: by the drift of areas and lengths over the run.
     step_control: Literal["embedded", "area-length"] = "embedded"
@@ -119,8 +120,10 @@ class Numerics(Model):
             raise ValueError(
                 f"order can be chosen for integrator 'sdc' only, got {self.order} with {self.integrator!r}"
             )
-        if self.step_control == "area-length" and self.integrator == "bdf":
-            raise ValueError("step_control 'area-length' needs integrator 'sdc' or 'imex-euler', got 'bdf'")
+        if self.step_control == "area-length" and self.integrator not in ("sdc", "imex-euler"):
+            raise ValueError(
+                f"step_control 'area-length' needs integrator 'sdc' or 'imex-euler', got {self.integrator!r}"
+            )
         return self
 
 

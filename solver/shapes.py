@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipeinc
 
+from solver import curve
+
 Array = NDArray[np.float64]
 
 
@@ -26,6 +28,26 @@ def semi_axes(reduced_area: float, length: float) -> tuple[float, float]:
     aspect = brentq(excess, 1e-9, 1.0, xtol=1e-16, rtol=1e-15)
     major = length / (4 * ellipe(1 - aspect**2))
     return major, major * aspect
+
+
+def of_reduced_area(tangent_angle: Array, reduced_area: float) -> Array:
+    """Tangent angles (points,) of a membrane like the given one (points,) that has the reduced area.
+
+    Its deviation from a circle is scaled.  For an ellipse that the points resolve this changes nothing but
+    round-off; where they do not resolve its tips, the area through them is not the ellipse's.
+    """
+    turned = 2 * np.pi * np.arange(tangent_angle.size) / tangent_angle.size
+    circle = turned + np.mean(tangent_angle - turned)
+    deviation = tangent_angle - circle
+
+    def excess(scale: float) -> float:
+        theta = circle + scale * deviation
+        area = curve.area(curve.positions(theta, np.zeros(2), 2 * np.pi), curve.tangents(theta), 2 * np.pi)
+        return float(area / np.pi - reduced_area)
+
+    if np.max(np.abs(deviation)) < 1e-12:
+        return tangent_angle
+    return np.asarray(circle + brentq(excess, 0.5, 1.5, xtol=1e-15, rtol=1e-15) * deviation)
 
 
 def ellipse_tangent_angle(reduced_area: float, length: float, angle: float, points: int) -> Array:

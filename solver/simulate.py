@@ -5,6 +5,7 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,11 +13,12 @@ from scipy.interpolate import CubicSpline
 
 from solver.diagnostics import Recorder, conserved_quantities
 from solver.dynamics import Dynamics
-from solver.geometry import Geometry
-from solver.integrators import StepFailedError, integrator_for
+from solver.geometry import Geometry, Membranes
+from solver.integrators import Integrator, Step, StepFailedError, integrator_for
 from solver.orbit import Orbit
 from solver.outcome import History, criteria_of, latest_time
-from solver.run import Energy, Errors, Outcome, Run, Series, Viscosity, Work
+from solver.resolution import UnresolvedError, carried, resolution_of, with_points
+from solver.run import LARGEST_SPATIAL, Energy, Errors, Outcome, Run, Series, Viscosity, Work
 from solver.scene import Extension, Scene, Shear, Start, Trap
 from solver.start import placed_state, turned_state
 from solver.tension import TensionNotFoundError
@@ -35,9 +37,68 @@ class _Progress:
     time: float
     state: Array
     steps: int = 0
-    shortened: int = 0
+    rejected: int = 0
     smallest_step: float | None = None
     temporal_error: float = 0.0
+
+
+class _Cost(NamedTuple):
+    """What a run has cost so far."""
+
+    evaluations: int = 0
+    jacobians: int = 0
+    factorizations: int = 0
+
+
+class _Stage:
+    """The part of a run that has one number of points.
+
+    Parameters
+    ----------
+    scene : Scene
+        With that number.
+    before : _Cost
+        Of the parts before this one.
+    """
+
+    def __init__(self, scene: Scene, before: _Cost) -> None:
+        self.dynamics = Dynamics.of(scene)
+        self._scene = scene
+        self._before = before
+        self._integrator: Integrator | None = None
+
+    @property
+    def membranes(self) -> Membranes:
+        """What stays the same while this part lasts."""
+        return self.dynamics.membranes
+
+    def begin(self, time: float, state: Array, latest: float) -> None:
+        """Make the integrator that goes on from this state, until ``latest`` at most."""
+        self._integrator = integrator_for(
+            self._scene.numerics,
+            len(self._scene.vesicles),
+            self.dynamics.rate,
+            self.dynamics.jacobian,
+            lambda state: conserved_quantities(Geometry(self.membranes, state)),
+            state,
+            latest,
+            time,
+        )
+
+    def step(self) -> Step:
+        """Take one step."""
+        assert self._integrator
+        return self._integrator.step()
+
+    @property
+    def cost(self) -> _Cost:
+        """What the run has cost up to now."""
+        integrator = self._integrator
+        return _Cost(
+            self._before.evaluations + self.dynamics.evaluations,
+            self._before.jacobians + (integrator.jacobian_evaluations if integrator else 0),
+            self._before.factorizations + (integrator.factorizations if integrator else 0),
+        )
 
 
 def simulate(
@@ -62,31 +123,34 @@ def simulate(
         A numerical failure is an outcome (`Outcome.FAILED` with its reason), not an exception.
     """
     began = clock.perf_counter()
-    dynamics = Dynamics.of(scene)
-    start = _start(scene, dynamics, should_stop)
+    resolution = resolution_of(scene)
+    start = _start(scene, resolution.points, should_stop)
+    latest = latest_time(scene)
+    stage = _Stage(with_points(scene, start.points), _Cost())
     orbit = None
     if len(scene.vesicles) == 2:
-        orbit = Orbit(dynamics.membranes, start.state, scene.criteria.separated_distance)
-    recorder = Recorder(scene, dynamics, orbit)
+        orbit = Orbit(stage.membranes, start.state, scene.criteria.separated_distance)
+    recorder = Recorder(scene, stage.dynamics, orbit)
     criteria = criteria_of(scene)
-    latest = latest_time(scene)
     progress = _Progress(0.0, start.state)
     outcome, failure = Outcome.UNDECIDED, None
-    integrator = None
     try:
         recorder.record(0.0, start.state)
         if start.failure:
             raise StepFailedError(start.failure)
-        integrator = integrator_for(
-            scene.numerics,
-            dynamics.rate,
-            dynamics.jacobian,
-            lambda state: conserved_quantities(Geometry(dynamics.membranes, state)),
-            start.state,
-            latest,
-        )
+        stage.begin(0.0, start.state, latest)
         while progress.time < latest and outcome is Outcome.UNDECIDED:
-            step = integrator.step()
+            step = stage.step()
+            points = resolution.finer(stage.membranes, step.end, step.state)
+            if points is not None:
+                coarse, stage = stage.membranes, _Stage(with_points(scene, points), stage.cost)
+                progress.state = carried(coarse, progress.state, stage.membranes)
+                progress.rejected += 1
+                recorder.continue_with(stage.dynamics)
+                if orbit:
+                    orbit.membranes = stage.membranes
+                stage.begin(progress.time, progress.state, latest)
+                continue
             if step.end < latest or progress.smallest_step is None:  # the last one ends where the run does
                 taken = float(step.end - step.start)
                 progress.smallest_step = min(progress.smallest_step or taken, taken)
@@ -95,53 +159,64 @@ def simulate(
             _record_up_to(step.end, step.interpolate, recorder, scene.output.interval)
             progress.time, progress.state = step.end, step.state
             progress.steps += 1
-            progress.shortened += step.shortened
+            progress.rejected += step.shortened
             progress.temporal_error += step.local_error
-            history = History(recorder.values, dynamics, orbit, step.state)
+            history = History(recorder.values, stage.dynamics, orbit, step.state)
             decisions = (criterion.decide(history) for criterion in criteria)
             outcome = next((decision for decision in decisions if decision), Outcome.UNDECIDED)
-            if dynamics.evaluations > scene.numerics.work_limit:
+            if stage.cost.evaluations > scene.numerics.work_limit:
                 raise StepFailedError(f"the work limit of {scene.numerics.work_limit} evaluations is reached")
             if should_stop and should_stop():
                 raise Cancelled
             if on_progress:
                 on_progress(step.end, latest)
         recorder.finish(progress.time, progress.state)
-    except (StepFailedError, TensionNotFoundError, np.linalg.LinAlgError) as error:
+    except (StepFailedError, UnresolvedError, TensionNotFoundError, np.linalg.LinAlgError) as error:
         outcome, failure = Outcome.FAILED, str(error)
+        if recorder.spatial_error > LARGEST_SPATIAL:
+            points, spatial = stage.membranes.points, recorder.spatial_error
+            failure += f" ({points} points do not resolve the scene: spatial error {spatial:.1e})"
     work = Work(
         steps=progress.steps,
-        rejected_steps=progress.shortened,
-        rhs_evaluations=start.evaluations + dynamics.evaluations,
-        jacobian_evaluations=integrator.jacobian_evaluations if integrator else 0,
-        factorizations=integrator.factorizations if integrator else 0,
+        rejected_steps=progress.rejected,
+        rhs_evaluations=start.evaluations + stage.cost.evaluations,
+        jacobian_evaluations=stage.cost.jacobians,
+        factorizations=stage.cost.factorizations,
         wall_seconds=clock.perf_counter() - began,
         smallest_step=progress.smallest_step,
+        points=stage.membranes.points,
     )
     return _summary(scene, outcome, failure, progress, orbit, recorder, work)
 
 
 @dataclass(frozen=True)
 class _Start:
-    """The state to begin with, what finding it cost, and why it could not be found."""
+    """The state to begin with, its number of points, what finding it cost, and why it could not be found."""
 
+    points: int
     state: Array
     evaluations: int = 0
     failure: str | None = None
 
 
-def _start(scene: Scene, dynamics: Dynamics, should_stop: Callable[[], bool] | None) -> _Start:
-    placed = placed_state(scene)
+def _start(scene: Scene, points: int, should_stop: Callable[[], bool] | None) -> _Start:
+    """Where a run begins that needs these points for the vesicles as they are placed."""
+    placed = placed_state(with_points(scene, points))
     if not scene.start.relaxed:
-        return _Start(placed)
+        return _Start(points, placed)
     at_rest = scene.model_copy(update={"flow": None, "start": Start(), "horizon": scene.start.horizon})
     relaxed = simulate(at_rest, should_stop=should_stop)
     if relaxed.outcome is not Outcome.EQUILIBRIUM:
         reason = relaxed.failure or f"{relaxed.outcome} at time {relaxed.time:g}"
-        return _Start(placed, relaxed.work.rhs_evaluations, f"start: the pair did not relax ({reason})")
-    last = dynamics.membranes.pack(relaxed.frames.tangent_angle[-1], relaxed.frames.center[-1])
-    turned = turned_state(dynamics.membranes, last, scene.start.tilt)
-    return _Start(turned, relaxed.work.rhs_evaluations)
+        evaluations = relaxed.work.rhs_evaluations
+        return _Start(points, placed, evaluations, f"start: the pair did not relax ({reason})")
+    frames = relaxed.frames
+    points = frames.tangent_angle.shape[-1]
+    membranes = Membranes.of_scene(with_points(scene, points))
+    computed = slice(membranes.count)  # the others are images
+    last = membranes.pack(frames.tangent_angle[-1, computed], frames.center[-1, computed])
+    turned = turned_state(membranes, last, scene.start.tilt)
+    return _Start(points, turned, relaxed.work.rhs_evaluations)
 
 
 def _record_up_to(

@@ -72,6 +72,16 @@ def interpolations(points: int, largest_factor: int) -> Array:
     return _frozen(np.concatenate([np.empty((0, points)), *(interpolation(points, f) for f in factors)]))
 
 
+def resampled(values: Array, points: int) -> Array:
+    """Trigonometric interpolation of values (..., N) to ``points`` ≥ N points, (..., points), both even."""
+    given = values.shape[-1]
+    if points == given:
+        return values
+    spectrum = np.fft.rfft(values, axis=-1)
+    spectrum[..., -1] *= 0.5  # the highest mode stands for the two that it cannot tell apart
+    return np.asarray(np.fft.irfft(spectrum, points, axis=-1)) * (points / given)
+
+
 @cache
 def logarithm_weights(points: int) -> Array:
     """Circulant quadrature matrix W of the logarithm: Σ_j W_ij f_j = −½∫ log(4 sin²((α_i−β)/2)) f(β) dβ.

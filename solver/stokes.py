@@ -24,10 +24,10 @@ Array = NDArray[np.float64]
 
 
 class SingleLayer:
-    """Discrete single-layer potential, kept as its three components.
+    """Discrete single-layer potential, kept as a matrix.
 
-    The components act on point forces, that is force densities times the spacing, and are then symmetric
-    up to quadrature error.
+    It acts on point forces, that is force densities times the spacing, and is then symmetric up to
+    quadrature error.  Images (`symmetry`) carry the opposite forces.
 
     Parameters
     ----------
@@ -37,72 +37,67 @@ class SingleLayer:
 
     Attributes
     ----------
-    xx, xy, yy : (M·N, M·N)
-        Filled by `assemble`.
+    matrix : (2·M·N, 2·M·N)
+        From all x-components of point forces and then all y-components, to the velocity's; filled by
+        `assemble`.
     """
 
     def __init__(self, membranes: Membranes, accuracy: float) -> None:
         self._ratio = required_ratio(1.0, accuracy)
         points = membranes.points
         size = membranes.count * points
-        self.xx, self.xy, self.yy = np.zeros((3, size, size))
+        self._components = np.zeros((3, size, membranes.copies * size))
+        self.matrix = np.zeros((2 * size, 2 * size))
         self._correction = logarithm_correction(points)
         self._diagonal = self._correction[0, 0] - np.log(membranes.length / (2 * np.pi)) / (4 * np.pi)
 
     def assemble(self, geometry: Geometry, closeness: Closeness | None) -> None:
-        """Fill the components for this geometry; ``closeness`` is None for a single vesicle."""
-        count, points = geometry.membranes.count, geometry.membranes.points
-        all_points = geometry.points.reshape(2, -1)
-        components = self.xx, self.xy, self.yy
-        kernels.stokeslets(all_points, all_points, *components)
-        for vesicle in range(count):
-            kernels.complete_self_part(
-                self._correction,
-                self._diagonal[vesicle],
-                geometry.tangents[:, vesicle],
-                vesicle * points,
-                *components,
-            )
-        if closeness is None:
-            return
-        refinement = closeness.refinement(self._ratio)
-        refine_single_layer(geometry.points, refinement, *components)
-        if refinement.groups[:, 2].max() > LARGEST_REFINED:
-            close_single_layer(
-                geometry.points,
-                geometry.tangents,
-                geometry.membranes.spacing,
-                refinement,
-                self._correction,
-                differentiation(points),
-                *components,
-            )
+        """Fill the matrix for this geometry; ``closeness`` is None for a single curve."""
+        membranes = geometry.membranes
+        kernels.stokeslets(
+            geometry.points.reshape(2, -1), geometry.curve_points.reshape(2, -1), self._components
+        )
+        kernels.complete_self_parts(self._correction, self._diagonal, geometry.tangents, self._components)
+        if closeness:
+            refinement = closeness.refinement(self._ratio)
+            refine_single_layer(geometry.curve_points, refinement, self._components)
+            if refinement.groups[:, 2].max() > LARGEST_REFINED:
+                close_single_layer(
+                    geometry.curve_points,
+                    geometry.curve_tangents,
+                    membranes.curve_spacing,
+                    refinement,
+                    self._correction,
+                    differentiation(membranes.points),
+                    self._components,
+                )
+        kernels.join_components(self._components, self.matrix)
 
     def velocity(self, point_forces: Array) -> Array:
         """Velocity (2, M, N) that point forces (2, M, N) cause at the membranes' points."""
-        velocity = np.empty_like(point_forces)
-        velocity[0].flat, velocity[1].flat = self.columns(point_forces[0].ravel(), point_forces[1].ravel())
-        return velocity
+        return (self.matrix @ point_forces.ravel()).reshape(point_forces.shape)
 
-    def columns(self, fx: Array, fy: Array) -> tuple[Array, Array]:
-        """Velocity components for several point forces at once, (M·N, ...) each."""
-        return self.xx @ fx + self.xy @ fy, self.xy @ fx + self.yy @ fy
+    def columns(self, point_forces: Array) -> Array:
+        """Velocities (2, M·N, columns) for several point forces (2, M·N, columns) at once."""
+        _, size, columns = point_forces.shape
+        return (self.matrix @ point_forces.reshape(2 * size, columns)).reshape(2, size, columns)
 
-    def jacobian(self, geometry: Geometry, point_forces: Array) -> tuple[Array, Array]:
-        """Derivatives of `velocity` by the state, (M·N, state_size) each, at fixed point forces (2, M, N).
+    def jacobian(self, geometry: Geometry, point_forces: Array) -> Array:
+        """Derivatives of `velocity` by the state, (2, M·N, state_size), at fixed point forces (2, M, N).
 
         Sources that are refined for close targets are differentiated as if they were not.
         """
-        size = geometry.membranes.count * geometry.membranes.points
-        xx, xy, yx, yy = np.empty((4, size, size))
+        membranes = geometry.membranes
+        size = membranes.count * membranes.points
+        by_points = np.empty((2, size, 2, membranes.copies * size))
+        curve_forces = membranes.with_images(point_forces, axis=1).reshape(2, -1)
+        kernels.stokeslet_derivatives(geometry.curve_points.reshape(2, -1), curve_forces, by_points)
+        by_state = geometry.by_state(membranes.fold(by_points))
         forces = point_forces.reshape(2, -1)
-        kernels.stokeslet_derivatives(geometry.points.reshape(2, -1), forces, xx, xy, yx, yy)
-        by_x, by_y = geometry.by_state(xx, xy), geometry.by_state(yx, yy)
         # On the diagonal r⊗r/r² is t⊗t, which turns with the tangent.
         tangents, normals = geometry.tangents.reshape(2, -1), geometry.normals.reshape(2, -1)
         along, across = np.sum(tangents * forces, axis=0), np.sum(normals * forces, axis=0)
         turned = (normals * along + tangents * across) / (4 * np.pi)
         every_point = np.arange(size)
-        by_x[every_point, every_point] += turned[0]
-        by_y[every_point, every_point] += turned[1]
-        return by_x, by_y
+        by_state[:, every_point, every_point] += turned
+        return by_state

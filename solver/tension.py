@@ -18,16 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 
+from solver.compilation import compiled
 from solver.geometry import Geometry
-from solver.kernels import compiled
 from solver.spectral import differentiation
 from solver.stokes import SingleLayer
 
 Array = NDArray[np.float64]
 
-# Relative weight of the mean tension that keeps the inverse finite for a circle.  There a constant tension
-# is a pressure and moves nothing, so its value does not matter; it must only not be divided by round-off.
-_CIRCLE_SHIFT = 1e-13
+ROUND_OFF = 1e-15  # the least `Inextensibility.elasticity` that means anything
 
 
 class TensionNotFoundError(ArithmeticError):
@@ -48,14 +46,13 @@ class Inextensible(NamedTuple):
 
 @compiled
 def _conjugate_gradients(
-    xx: Array,
-    xy: Array,
-    yy: Array,
+    layer: Array,
     tangents: Array,
     derivative: Array,
     wavenumber: Array,
     spacing: Array,
     inverse: Array,
+    shift: float,
     tolerance: float,
     natural_rate: float,
     limit: int,
@@ -66,20 +63,21 @@ def _conjugate_gradients(
 ) -> int:
     """Write what `Inextensible` holds; return the number of iterations, or −1 if ``limit`` was not enough.
 
-    ``derivative`` is the transposed differentiation matrix; ``wavenumber`` (M, 1) = 2π/length; ``imposed``
-    (2, M, N) is the velocity u₀ without tension, and ``natural_rate`` a stretching that counts as large.
+    ``layer`` is the matrix of the single-layer potential, ``derivative`` the transposed one of
+    differentiation; ``wavenumber`` (M, 1) = 2π/length; ``shift`` times the mean tension is added to A σ;
+    ``imposed`` (2, M, N) is the velocity u₀ without tension, and ``natural_rate`` a stretching that counts as
+    large.
     """
     count, points = tension.shape
     size = count * points
-    tx, ty = tangents[0], tangents[1]
     weight = wavenumber * spacing
-    stretching = tx * np.dot(imposed[0], derivative) + ty * np.dot(imposed[1], derivative)
-    residual = (stretching * weight).reshape(size)
+    gradient = np.dot(imposed.reshape(2 * count, points), derivative).reshape(imposed.shape)
+    residual = ((tangents[0] * gradient[0] + tangents[1] * gradient[1]) * weight).reshape(size)
     weights = natural_rate * spacing
     natural = np.sqrt(points * np.sum(weights * weights))
     goal = tolerance * max(np.sqrt(np.dot(residual, residual)), natural)
     solution = np.zeros(size)
-    flow_x, flow_y = imposed[0].copy().reshape(size), imposed[1].copy().reshape(size)
+    flow = imposed.copy().reshape(2 * size)
     direction = np.dot(inverse, residual)
     product = np.dot(residual, direction)
     iteration = 0
@@ -87,27 +85,26 @@ def _conjugate_gradients(
         if iteration == limit:
             return -1
         iteration += 1
-        field = direction.reshape(count, points)
-        fx = (np.dot(field * tx, derivative) * weight).reshape(size)
-        fy = (np.dot(field * ty, derivative) * weight).reshape(size)
-        ux = np.dot(xx, fx) + np.dot(xy, fy)
-        uy = np.dot(xy, fx) + np.dot(yy, fy)
-        ux_s = np.dot(ux.reshape(count, points), derivative)
-        uy_s = np.dot(uy.reshape(count, points), derivative)
-        image = (-(tx * ux_s + ty * uy_s) * weight).reshape(size)
+        pull = (direction.reshape(count, points) * tangents).reshape(2 * count, points)
+        forces = np.dot(pull, derivative).reshape(imposed.shape) * weight
+        change = np.dot(layer, forces.reshape(2 * size))
+        gradient = np.dot(change.reshape(2 * count, points), derivative).reshape(imposed.shape)
+        image = (-(tangents[0] * gradient[0] + tangents[1] * gradient[1]) * weight).reshape(size)
+        for vesicle in range(count):
+            own = slice(vesicle * points, (vesicle + 1) * points)
+            image[own] += shift * direction[own].mean()
         step = product / np.dot(direction, image)
         solution += step * direction
-        flow_x += step * ux
-        flow_y += step * uy
+        flow += step * change
         residual -= step * image
         correction = np.dot(inverse, residual)
         previous = product
         product = np.dot(residual, correction)
         direction = correction + (product / previous) * direction
     tension[:] = solution.reshape(count, points)
-    velocity[0] = flow_x.reshape(count, points)
-    velocity[1] = flow_y.reshape(count, points)
-    turning[:] = wavenumber * (tx * np.dot(velocity[1], derivative) - ty * np.dot(velocity[0], derivative))
+    velocity[:] = flow.reshape(imposed.shape)
+    gradient = np.dot(flow.reshape(2 * count, points), derivative).reshape(imposed.shape)
+    turning[:] = wavenumber * (tangents[0] * gradient[1] - tangents[1] * gradient[0])
     return iteration
 
 
@@ -119,12 +116,18 @@ class Inextensibility:
     tolerance : float
         Stretching left over, relative to that without tension or to `Membranes.natural_rate` if that is
         larger: in a state of rest there is no other scale.
+    elasticity : float
+        How much a constant tension stretches a membrane, relative to a varying one.  On a circle such a
+        tension is a pressure that moves nothing: it must not be divided by round-off, nor by the error of
+        the sums over other membranes.  A vesicle whose ellipticity squared is below this gives way.
     """
 
-    def __init__(self, tolerance: float) -> None:
+    def __init__(self, tolerance: float, elasticity: float) -> None:
         self.tolerance = tolerance
         self.iterations = 0
+        self._elasticity = elasticity
         self._inverse: Array | None = None
+        self._shift = 0.0
 
     def solve(self, layer: SingleLayer, geometry: Geometry, imposed: Array) -> Inextensible:
         """The motion when all forces but the tension, and the flow, cause the velocity ``imposed`` (2, M, N).
@@ -142,14 +145,13 @@ class Inextensibility:
                 np.empty(imposed.shape[1:]), np.empty(imposed.shape), np.empty(imposed.shape[1:])
             )
             iterations = _conjugate_gradients(
-                layer.xx,
-                layer.xy,
-                layer.yy,
+                layer.matrix,
                 geometry.tangents,
                 differentiation(membranes.points).T,
                 membranes.wavenumber,
                 membranes.spacing[:, None],
                 self._inverse,
+                self._shift,
                 self.tolerance,
                 membranes.natural_rate,
                 limit,
@@ -161,37 +163,32 @@ class Inextensibility:
                 return found
         raise TensionNotFoundError("the tension could not be found: the membrane is too distorted")
 
-    def factorize(self, layer: SingleLayer, geometry: Geometry) -> tuple[Array, Array, Array]:
+    def factorize(self, layer: SingleLayer, geometry: Geometry) -> tuple[Array, Array]:
         """Make the dense inverse for this geometry.
 
         Returns
         -------
         inverse : (M·N, M·N)
             Of A, weighted with the spacing.
-        flow_x, flow_y : (M·N, M·N)
+        flow : (2, M·N, M·N)
             S T, the velocity of each unit tension.
         """
         membranes = geometry.membranes
         points, count = membranes.points, membranes.count
         weighted = (2 * np.pi / points) * differentiation(points)  # spacing · ∂/∂s
-
-        def of_tangents(component: Array) -> Array:
-            return (component.reshape(-1, points) @ weighted).reshape(component.shape)
-
-        tx, ty = geometry.tangents.reshape(2, -1)
-        xy = of_tangents(layer.xy)
-        flow_x = of_tangents(layer.xx) * tx + xy * ty
-        flow_y = xy * tx + of_tangents(layer.yy) * ty
-        system = self.stretching(geometry, flow_x, flow_y)
+        of_tangents = (layer.matrix.reshape(-1, points) @ weighted).reshape(2, count * points, 2, -1)
+        of_tangents *= geometry.tangents.reshape(2, -1)
+        flow = of_tangents[:, :, 0] + of_tangents[:, :, 1]
+        system = self.stretching(geometry, flow)
         system *= -np.repeat(membranes.spacing, points)[:, None]
-        # A circle shifts by a constant; and differentiation loses the highest mode, whose tension gets the
-        # weight of its neighbors.
         typical = np.trace(system) / (count * points)
+        self._shift = self._elasticity * typical
+        # Differentiation loses the highest mode, whose tension gets the weight of its neighbors.
         alternating = np.where(np.arange(points) % 2 == 0, 1.0, -1.0)
-        shift = typical * (_CIRCLE_SHIFT * count + np.outer(alternating, alternating) / points)
+        added = (self._shift + typical * np.outer(alternating, alternating)) / points
         for vesicle in range(count):
             block = slice(vesicle * points, (vesicle + 1) * points)
-            system[block, block] += shift
+            system[block, block] += added
         # The lower triangle is used alone: the operator is symmetric up to quadrature error.
         factor, failed = lapack.dpotrf(system.T, lower=0, overwrite_a=1)
         if failed:
@@ -200,14 +197,13 @@ class Inextensibility:
         inverse = np.triu(triangle)
         inverse += np.triu(triangle, 1).T
         self._inverse = np.ascontiguousarray(inverse)
-        return self._inverse, flow_x, flow_y
+        return self._inverse, flow
 
     @staticmethod
-    def stretching(geometry: Geometry, ux: Array, uy: Array) -> Array:
-        """x_s · u_s for velocity components (M·N, columns)."""
-        gradient_x, gradient_y = (geometry.column_derivative(u) for u in (ux, uy))
-        tx, ty = geometry.tangents.reshape(2, -1, 1)
-        gradient_x *= tx
-        gradient_y *= ty
-        gradient_x += gradient_y
-        return gradient_x
+    def stretching(geometry: Geometry, velocity: Array) -> Array:
+        """x_s · u_s for velocities (2, M·N, columns)."""
+        gradient = geometry.column_derivative(velocity)
+        gradient *= geometry.tangents.reshape(2, -1, 1)
+        gradient[0] += gradient[1]
+        stretching: Array = gradient[0]
+        return stretching

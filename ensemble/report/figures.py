@@ -13,8 +13,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from ensemble.figures.style import BLACK, BLUE, GRAY, GREEN, ORANGE, PURPLE, SKY, STYLE, VERMILLION, WIDTH
+from ensemble.report.measurement import Measurement
 from ensemble.report.stability import Stability, Verdict
-from ensemble.report.work_precision import Measurement, WorkPrecision
+from ensemble.report.work_precision import WorkPrecision
 
 _COLORS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK)  # by method
 _SHAPES = ("o", "s", "^", "D", "v")  # by number of points
@@ -113,7 +114,7 @@ def stability_figure(report: Stability) -> Figure:
     figure = Figure(figsize=(WIDTH, 0.8 + 0.17 * len(report.rows)), layout="constrained")
     left, right = figure.subplots(1, 2, sharey=True)
     left.set(xscale="log", xlabel="evaluations")
-    right.set(xscale="log", xlabel="spectrum tail (rad) and area drift")
+    right.set(xscale="log", xlabel="spatial error and area drift")
     names = [row.scene for row in report.rows]
     left.xaxis.set_minor_formatter(NullFormatter())
     left.set_yticks(range(len(names)), names, fontsize=6)
@@ -139,7 +140,7 @@ def stability_figure(report: Stability) -> Figure:
                 linestyle="none",
                 markersize=4,
             )
-    right.set_title("filled: tail, open: drift", fontsize=8)
+    right.set_title("filled: spatial, open: drift", fontsize=8)
     for axes in (left, right):
         axes.grid(axis="y", linewidth=0.3, color=GRAY, alpha=0.4)
     figure.legend(loc="outside lower center", ncols=len(_VERDICTS))

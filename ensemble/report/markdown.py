@@ -22,6 +22,16 @@ _REFERENCE = {
     "seconds": "wall_seconds",
 }
 _SLOPE = {"scene": "scene", "method": "method", "N": "points", "order": "order", "points fitted": "fitted"}
+_ENVELOPE = {
+    "scene": "scene",
+    "error": "error",
+    "fastest": "fastest",
+    "its seconds": "fastest_seconds",
+    "default": "default",
+    "seconds of the default": "default_seconds",
+    "default / fastest": "slowdown",
+    "SDC of order 2 / default": "speedup",
+}
 _MEASUREMENT = {
     "scene": "scene",
     "method": "method",
@@ -62,9 +72,8 @@ _ROW = {
     "area error": "area_error",
     "closure error": "closure_error",
     "temporal error": "temporal_error",
-    "spectrum tail": "spatial_error",
+    "spatial error": "spatial_error",
     "smallest gap": "smallest_gap",
-    "gap resolution": "gap_resolution",
     "energy rise": "energy_rise",
     "smallest step": "smallest_step",
     "steps": "steps",
@@ -119,6 +128,10 @@ def work_precision_text(report: WorkPrecision, figures: Sequence[str]) -> str:
         "Error ∝ evaluations^(−order), a least-squares fit over the tolerances.  Left out are errors at most "
         f"{FLOOR:g} times the least one at the same N, where the error in space shows.",
         table(_SLOPE, report.slopes),
+        "## Least time to an error",
+        "The least time in which a run came within this error, at whatever tolerance and number of points: "
+        "by the fastest method, by the default one, and beside spectral deferred correction of order 2.",
+        table(_ENVELOPE, report.envelopes),
         "## Position error",
         table(_MEASUREMENT, report.measurements),
         "## Answers: period and intrinsic viscosity of the doublet in shear",

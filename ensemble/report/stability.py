@@ -12,15 +12,11 @@ from ensemble.keys import run_key
 from ensemble.report.document import Document
 from ensemble.report.machine import Machine
 from ensemble.report.runs import Runs
-from solver.quadrature import required_ratio
-from solver.refinement import MAXIMUM_FACTOR
-from solver.run import Outcome, Run
+from solver.run import LARGEST_SPATIAL, Outcome, Run
 from solver.scene import Scene
 
 QUICK_WORK_LIMIT = 3_000  # evaluations
 
-LARGEST_TAIL = 1e-3  # radians, of the tangent angle's spectrum
-QUADRATURE_ERROR = 1e-6  # relative, of the forces between two parallel membranes at the smallest gap
 LARGEST_DRIFT = 1e-2  # of area (relative) and closure (over length)
 LARGEST_RISE = 1e-3  # of the energy at rest, over its largest magnitude
 
@@ -38,9 +34,9 @@ class Verdict(StrEnum):
 CRITERIA: Mapping[Verdict, str] = {
     Verdict.FAILED: "the run gave up, for the reason stated, or raised an error",
     Verdict.SPACE: (
-        f"the last third of the tangent angle's spectrum exceeds {LARGEST_TAIL:g} rad, or at the smallest "
-        f"gap the trapezoid rule, refined at most {MAXIMUM_FACTOR} times, misses the force between two "
-        f"parallel membranes by more than {QUADRATURE_ERROR:g} (gap resolution below 1)"
+        f"the spatial error exceeds {LARGEST_SPATIAL:g}: that is the amplitude (rad) of the last third of "
+        "the tangent angle's spectrum, or the relative error across a vesicle's waist or of adhesion at the "
+        "smallest gap, whichever is largest"
     ),
     Verdict.TIME: (
         f"resolved in space, yet area or closure drift by more than {LARGEST_DRIFT:g}, or the energy of a "
@@ -53,7 +49,6 @@ CRITERIA: Mapping[Verdict, str] = {
 class Row(Document):
     """One scene.  A quantity that the scene does not have, or that is not finite, is None.
 
-    gap_resolution : MAXIMUM_FACTOR · smallest gap / spacing, over what `QUADRATURE_ERROR` needs.
     energy_rise : largest rise above an earlier energy at rest, over the energy's largest magnitude.
     """
 
@@ -70,7 +65,6 @@ class Row(Document):
     temporal_error: float | None = None
     spatial_error: float | None = None
     smallest_gap: float | None = None
-    gap_resolution: float | None = None
     energy_rise: float | None = None
     smallest_step: float | None = None
     steps: int | None = None
@@ -121,9 +115,8 @@ def _row(runs: Runs, group: str, name: str, scene: Scene) -> Row:
             horizon=scene.horizon,
         )
     smallest_gap = float(np.min(run.series["gap"])) if "gap" in run.series else None
-    resolution = None if smallest_gap is None else gap_resolution(scene, smallest_gap)
     rise = energy_rise(run) if scene.flow is None else None
-    verdict, reason = judge(run, resolution, rise)
+    verdict, reason = judge(run, rise)
     return Row(
         group=group,
         scene=name,
@@ -138,7 +131,6 @@ def _row(runs: Runs, group: str, name: str, scene: Scene) -> Row:
         temporal_error=_finite(run.error.temporal),
         spatial_error=_finite(run.error.spatial),
         smallest_gap=_finite(smallest_gap),
-        gap_resolution=_finite(resolution),
         energy_rise=_finite(rise),
         smallest_step=run.work.smallest_step,
         steps=run.work.steps,
@@ -148,38 +140,26 @@ def _row(runs: Runs, group: str, name: str, scene: Scene) -> Row:
     )
 
 
-def gap_resolution(scene: Scene, gap: float) -> float:
-    """How finely the quadrature samples membranes at a gap, over what `QUADRATURE_ERROR` needs."""
-    spacing = max(vesicle.length for vesicle in scene.vesicles) / scene.numerics.points
-    # The kernels of the fluid and of adhesion over a straight membrane: see `solver.adhesion`.
-    order = 1.0 if scene.adhesion is None else 0.5 * scene.adhesion.exponents[0] + 1
-    return MAXIMUM_FACTOR * gap / spacing / required_ratio(order, QUADRATURE_ERROR)
-
-
 def energy_rise(run: Run) -> float:
     """Largest rise of the total energy above an earlier value, over its largest magnitude."""
     energy = run.series["bending_energy"] + run.series.get("adhesion_energy", 0.0)
     return float(np.max(energy - np.minimum.accumulate(energy)) / np.max(np.abs(energy)))
 
 
-def judge(run: Run, resolution: float | None, rise: float | None) -> tuple[Verdict, str]:
+def judge(run: Run, rise: float | None) -> tuple[Verdict, str]:
     """Verdict by `CRITERIA` and what it rests on.
 
     Parameters
     ----------
     run : Run
-    resolution : float or None
-        See `gap_resolution`; None for one vesicle.
     rise : float or None
         See `energy_rise`; None in a flow.
     """
     if run.outcome is Outcome.FAILED:
         return Verdict.FAILED, run.failure or "no reason given"
     # Written so that NaN, which compares as false, never passes.
-    if not run.error.spatial <= LARGEST_TAIL:
-        return Verdict.SPACE, f"spectrum tail {run.error.spatial:.1e}"
-    if resolution is not None and not resolution >= 1:
-        return Verdict.SPACE, f"gap resolution {resolution:.2g}"
+    if not run.error.spatial <= LARGEST_SPATIAL:
+        return Verdict.SPACE, f"spatial error {run.error.spatial:.1e}"
     if not run.error.area <= LARGEST_DRIFT:
         return Verdict.TIME, f"area drift {run.error.area:.1e}"
     if not run.error.closure <= LARGEST_DRIFT:

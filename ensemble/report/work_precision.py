@@ -10,7 +10,9 @@ import numpy as np
 from ensemble.keys import run_key
 from ensemble.report.answers import Answer, Critical, answers, critical_values
 from ensemble.report.document import Document
+from ensemble.report.envelope import Envelope, envelopes
 from ensemble.report.machine import Machine
+from ensemble.report.measurement import Measurement
 from ensemble.report.methods import Method, Plan
 from ensemble.report.runs import Runs
 from ensemble.report.shape import final_membranes, shape_distance
@@ -36,22 +38,6 @@ class Reference(Document):
     run_key: str
 
 
-class Measurement(Document):
-    """One run.  Errors are distances from the converged run's membranes; None if the run failed."""
-
-    scene: str
-    method: str
-    points: int
-    tolerance: float
-    error_rms: float | None
-    error_max: float | None
-    wall_seconds: float
-    evaluations: int
-    steps: int
-    failure: str | None
-    run_key: str
-
-
 class Slope(Document):
     """Observed order: error ∝ evaluations^(−order), by least squares; None with fewer than two points."""
 
@@ -70,6 +56,7 @@ class WorkPrecision(Document):
     references: list[Reference]
     measurements: list[Measurement]
     slopes: list[Slope]
+    envelopes: list[Envelope]
     answers: list[Answer]
     critical_values: list[Critical]
 
@@ -101,6 +88,7 @@ def work_precision(runs: Runs, plan: Plan, scenes: Mapping[str, Scene]) -> WorkP
         references=references,
         measurements=measurements,
         slopes=slopes(measurements),
+        envelopes=envelopes(scenes, measurements),
         answers=answers(runs, plan),
         critical_values=critical_values(runs, plan),
     )

@@ -163,10 +163,13 @@ def condition(text: str, document: InstrumentedAttribute[Any], fields: Fields) -
         kinds = {_apparent_type(value)}
     if any(_is_group(kind) for kind in kinds):
         raise StoreInputError(f"where: {path} is a group of fields; compare one of them, or {path}=null")
-    if kinds <= {float, int}:
-        _parse(value, path, Union[tuple(kinds)])  # noqa: UP007
+    words = {word for kind in kinds if get_origin(kind) is Literal for word in get_args(kind)}
+    numbers = kinds & {float, int}
+    if numbers and value not in words:
+        _parse(value, path, Union[tuple(numbers)])  # noqa: UP007
         # Compared as documents are, in double precision: SQL has no integers as long as Python's.
-        return and_(compare(element.as_float(), float(value)), element.as_string().not_in(NON_FINITE))
+        number = float(value)
+        return and_(compare(element.as_float(), number), element.as_string().not_in([*NON_FINITE, *words]))
     if kinds == {datetime}:
         return compare(element.as_string(), timestamp_text(_parse(value, path, datetime)))
     if sign not in EQUALITIES:

@@ -2,14 +2,13 @@
 
 from solver.integrators.base import Integrator, Step, StepFailedError
 from solver.integrators.bdf import BackwardDifferentiation
-from solver.integrators.choice import integrator_for
-from solver.integrators.sdc import DeferredCorrection
+from solver.integrators.choice import integrator_for, usual_integrator
 
 __all__ = [
     "BackwardDifferentiation",
-    "DeferredCorrection",
     "Integrator",
     "Step",
     "StepFailedError",
     "integrator_for",
+    "usual_integrator",
 ]

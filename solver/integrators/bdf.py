@@ -36,11 +36,12 @@ class BackwardDifferentiation:
         state: Array,
         tolerance: float,
         end: float,
+        start: float = 0.0,
     ) -> None:
         self._rate, self._jacobian = rate, jacobian
         self._bdf = BDF(
             self._rate_or_nan,
-            0.0,
+            start,
             state,
             end,
             rtol=100 * np.finfo(float).eps,  # the least that SciPy accepts; set to zero below

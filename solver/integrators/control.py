@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 _SAFETY = 0.9  # aimed at below what is allowed, as a factor of the step size
-_SHRINK, _GROW = 0.2, 2.0  # limits of the change from one attempt to the next
+_SHRINK, _GROW = 0.2, 5.0  # limits of the change from one attempt to the next
 
 
 def root_mean_square(values: Array) -> float:
@@ -26,12 +26,16 @@ class Attempt:
 
     before, after : (state_size,), the states at its ends.
     estimate : (state_size,), the embedded estimate of the error of ``after``.
+    interpolate : maps a fraction of the step, in [0, 1], to the state there.
+    slope : the rate in ``after``, None where the method does not come to it.
     """
 
     size: float
     before: Array
     after: Array
     estimate: Array
+    interpolate: Callable[[float], Array]
+    slope: Array | None = None
 
 
 @dataclass(frozen=True)

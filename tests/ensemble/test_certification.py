@@ -150,6 +150,11 @@ def test_finer_means_twice_the_points_and_a_tenth_of_the_tolerance() -> None:
     assert fine.model_copy(update={"numerics": scene.numerics}) == scene
 
 
+def test_points_that_the_tolerance_chooses_are_left_to_the_finer_one() -> None:
+    scene = load_study("critical-hamaker", ["scene.numerics.points=auto"], certify=True).scene
+    assert finer(scene).numerics == Numerics(points="auto", tolerance=scene.numerics.tolerance / 10)
+
+
 @pytest.mark.parametrize(
     ("change", "field"),
     [

@@ -25,6 +25,7 @@ RUN_FIELDS = {
     "viscosity",
     "energy",
     "error",
+    "points",
     "steps",
     "rejected_steps",
     "rhs_evaluations",

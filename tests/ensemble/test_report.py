@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 
 from ensemble.figures import save
+from ensemble.report.envelope import ERRORS, envelopes
 from ensemble.report.extremes import GROUPS
 from ensemble.report.figures import error_figures
 from ensemble.report.markdown import work_precision_text
-from ensemble.report.methods import DEFAULT, FULL, QUICK, Method, Plan
+from ensemble.report.measurement import Measurement
+from ensemble.report.methods import BDF, FULL, QUICK, ROSENBROCK, Method, Plan
 from ensemble.report.runs import Runs
 from ensemble.report.scenes import SCENES
 from ensemble.report.shape import shape_distance
@@ -21,12 +23,11 @@ from ensemble.report.stability import (
     Stability,
     Verdict,
     energy_rise,
-    gap_resolution,
     judge,
     quick_groups,
     stability,
 )
-from ensemble.report.work_precision import Measurement, WorkPrecision, slopes, work_precision
+from ensemble.report.work_precision import WorkPrecision, slopes, work_precision
 from ensemble.store import Store
 from solver import curve
 from solver.run import Outcome
@@ -35,9 +36,9 @@ from solver.shapes import ellipse_tangent_angle
 from solver.simulate import simulate
 
 TINY = Plan(
-    methods=(DEFAULT,),
+    methods=(BDF,),
     points=(32,),
-    tolerances=(1e-2, 1e-4),
+    tolerances=(1e-1, 1e-4),
     work_limit=5_000,
     reference=(48, 1e-6),
     control=(40, 1e-6),
@@ -95,7 +96,7 @@ def test_a_curve_offset_along_its_normals_is_that_far_away(offset):
 
 def test_the_error_falls_with_the_tolerance(report):
     loose, tight = report.measurements
-    assert (loose.tolerance, tight.tolerance) == (1e-2, 1e-4)
+    assert (loose.tolerance, tight.tolerance) == TINY.tolerances
     assert tight.error_rms < 0.1 * loose.error_rms
     assert tight.error_rms <= tight.error_max
     assert tight.evaluations > loose.evaluations
@@ -135,6 +136,7 @@ def test_the_document_survives_json(report):
     assert document.keys() == {
         "report",
         "machine",
+        "envelopes",
         "references",
         "measurements",
         "slopes",
@@ -163,8 +165,8 @@ def test_the_report_is_drawn_and_written(report, tmp_path):
 
 
 def test_a_run_that_fails_has_no_error_and_ends_its_series(store):
-    scarce = Method("BDF, scarce", {"work_limit": 200})
-    plan = replace(TINY, methods=(DEFAULT, scarce), tolerances=(1e-2, 1e-7, 1e-8))
+    scarce = Method("BDF, scarce", {"integrator": "bdf", "work_limit": 200})
+    plan = replace(TINY, methods=(BDF, scarce), tolerances=(1e-2, 1e-7, 1e-8))
     measured = work_precision(Runs(store, lambda line: None), plan, ONE_SCENE)
     series = [point for point in measured.measurements if point.method == "BDF, scarce"]
     assert [point.tolerance for point in series] == [1e-2, 1e-7]
@@ -192,6 +194,35 @@ def test_observed_orders_leave_out_the_floor(report):
     assert fourth.order == pytest.approx(4.0, abs=0.02)
     (alone,) = slopes(series(2.0, 1.0, "floor only"))
     assert alone.order is None
+
+
+def test_the_envelope_is_the_least_time_to_an_error_at_any_resolution(report):
+    template = report.measurements[0]
+
+    def measured(method: str, points: int, error: float | None, seconds: float) -> Measurement:
+        changed = {"method": method, "points": points, "error_rms": error, "wall_seconds": seconds}
+        return template.model_copy(update=changed)
+
+    found = envelopes(
+        ONE_SCENE,
+        [
+            measured(ROSENBROCK.name, 32, 5e-3, 0.2),
+            measured(ROSENBROCK.name, 64, 8e-5, 0.3),
+            measured(ROSENBROCK.name, 64, None, 0.01),
+            measured(BDF.name, 32, 2e-4, 0.1),
+            measured("SDC, order 2", 32, 9e-4, 1.5),
+            template.model_copy(update={"scene": "another", "error_rms": 1e-9, "wall_seconds": 1e-3}),
+        ],
+    )
+    assert [row.error for row in found] == list(ERRORS)
+    assert {row.default for row in found} == {ROSENBROCK.name}
+    coarse, middle, fine, *finer = found
+    assert (coarse.fastest, coarse.fastest_seconds, coarse.default_seconds) == (BDF.name, 0.1, 0.2)
+    assert coarse.slowdown == pytest.approx(2.0)
+    assert middle.slowdown == pytest.approx(3.0)
+    assert middle.speedup == pytest.approx(5.0)
+    assert (fine.fastest, fine.slowdown, fine.speedup) == (ROSENBROCK.name, 1.0, None)
+    assert all(row.fastest is row.default_seconds is row.slowdown is None for row in finer)
 
 
 @pytest.mark.parametrize("plan", [QUICK, FULL])
@@ -234,21 +265,19 @@ def test_verdicts_follow_the_criteria():
     pair = EXTREMES["start at a quarter of the adhesion distance, at rest"]
     coarse = Numerics(points=48, tolerance=1e-3)
     run = simulate(pair.model_copy(update={"horizon": 2.0, "numerics": coarse}))
-    resolution = gap_resolution(run.scene, float(run.series["gap"].min()))
     rise = energy_rise(run)
-    assert judge(run, resolution, rise) == (Verdict.FINE, "")
+    assert judge(run, rise) == (Verdict.FINE, "")
 
     def with_errors(**errors: float):
         return replace(run, error=replace(run.error, **errors))
 
-    assert judge(run, 0.99, rise)[0] is Verdict.SPACE
-    assert judge(with_errors(spatial=2e-3), resolution, rise)[0] is Verdict.SPACE
-    assert judge(with_errors(spatial=float("nan")), resolution, rise)[0] is Verdict.SPACE
-    assert judge(with_errors(area=2e-2), resolution, rise)[0] is Verdict.TIME
-    assert judge(with_errors(closure=2e-2), resolution, rise)[0] is Verdict.TIME
-    assert judge(run, resolution, 2e-3)[0] is Verdict.TIME
+    assert judge(with_errors(spatial=2e-3), rise)[0] is Verdict.SPACE
+    assert judge(with_errors(spatial=float("nan")), rise)[0] is Verdict.SPACE
+    assert judge(with_errors(area=2e-2), rise)[0] is Verdict.TIME
+    assert judge(with_errors(closure=2e-2), rise)[0] is Verdict.TIME
+    assert judge(run, 2e-3)[0] is Verdict.TIME
     failed = replace(run, outcome=Outcome.FAILED, failure="no step is small enough")
-    assert judge(failed, resolution, rise) == (Verdict.FAILED, "no step is small enough")
+    assert judge(failed, rise) == (Verdict.FAILED, "no step is small enough")
 
 
 def test_the_energy_rise_is_the_largest_above_any_earlier_value():
@@ -257,16 +286,6 @@ def test_the_energy_rise_is_the_largest_above_any_earlier_value():
     assert energy_rise(run) < 1e-6
     climbing = replace(run, series={**run.series, "bending_energy": np.array([10.0, 6.0, 8.0, 5.0, 6.5])})
     assert energy_rise(climbing) == pytest.approx(0.2)
-
-
-def test_the_gap_resolution_tells_where_adhesion_loses_its_accuracy():
-    scene = EXTREMES["distance 0.1, at rest"]
-    spacing = 2 * np.pi / scene.numerics.points
-    # 32 sub-intervals over one spacing; the steeper potential needs more of them.
-    steep = scene.model_copy(update={"adhesion": scene.adhesion.model_copy(update={"exponents": (24, 12)})})
-    assert gap_resolution(scene, spacing) > 1 > gap_resolution(scene, spacing / 32)
-    assert gap_resolution(steep, spacing) < gap_resolution(scene, spacing)
-    assert gap_resolution(scene, 2 * spacing) == pytest.approx(2 * gap_resolution(scene, spacing))
 
 
 def test_a_scene_that_raises_does_not_hide_the_others(store):

@@ -26,6 +26,8 @@ from ensemble.boundary import Boundary, BoundaryPoint
 from ensemble.keys import run_key
 from ensemble.store import Store, StoreError, StoreInputError
 from solver.run import Outcome, Run
+from solver.scene import Criteria, Numerics
+from solver.simulate import simulate
 from tests.ensemble.runs import assert_same_run, failed_run, quiescent_scene, shear_run, shear_scene
 
 PRELUDE = """
@@ -114,6 +116,28 @@ def test_run_comes_back_bit_for_bit(store: Store, run: Run) -> None:
     assert store.check() == []
     with Store.existing(store.path) as reopened:
         assert_same_run(reopened.load(key), run)
+
+
+def test_a_run_whose_points_were_raised_comes_back(store: Store) -> None:
+    """Its frames are checked against the number it ended with, which filters find, too."""
+    scene = shear_scene().model_copy(update={"numerics": Numerics(points="auto"), "horizon": 8.0})
+    run = simulate(scene.model_copy(update={"criteria": Criteria(extensions=1.0)}))
+    assert run.work.points
+    assert run.work.points > 32
+    store.save(run)
+    assert_same_run(store.load(run_key(run.scene)), run)
+    assert store.check() == []
+    found = [store.summaries([where]) for where in ("numerics.points=auto", f"work.points={run.work.points}")]
+    assert [[summary.key for summary in summaries] for summaries in found] == [[run_key(run.scene)]] * 2
+    assert store.summaries(["numerics.points<64"]) == store.summaries(["numerics.points!=auto"]) == []
+
+
+def test_frames_of_another_number_of_points_are_reported(store: Store) -> None:
+    run = shear_run(shear_scene(points=32))
+    store.save(replace(run, work=replace(run.work, points=48)))
+    assert [problem.partition(" has shape ")[0] for problem in store.check()] == [
+        f"run {run_key(run.scene)}: array {name}" for name in ("tangent_angle", "tension")
+    ]
 
 
 def test_long_arrays_are_stored_in_several_chunks(store: Store) -> None:

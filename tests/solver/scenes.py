@@ -54,4 +54,4 @@ def smooth_direction(membranes: Membranes, seed: int = 3) -> Array:
 
 def geometry_of(scene: Scene) -> Geometry:
     """The geometry in which a scene begins."""
-    return Geometry(Membranes.of(scene.vesicles, scene.numerics.points), placed_state(scene))
+    return Geometry(Membranes.of_scene(scene), placed_state(scene))

@@ -40,14 +40,14 @@ class Membrane:
         """By the close rule, (3, m, n)."""
         components = np.empty((3, targets.shape[1], self.size))
         tables = logarithm_correction(self.size), differentiation(self.size)
-        close_stokeslets(targets, self.points, self.tangents, self.spacing, *tables, *components)
+        close_stokeslets(targets, self.points, self.tangents, self.spacing, *tables, components)
         return components
 
     def refined_components(self, targets: Array, factor: int) -> Array:
         """By the trapezoid rule on ``factor`` times as many points, (3, m, n)."""
         matrix = interpolation(self.size, factor)
         components = np.empty((3, targets.shape[1], factor * self.size))
-        stokeslets(targets, self.points @ matrix.T, *components)
+        stokeslets(targets, self.points @ matrix.T, components)
         return np.asarray(components @ matrix) / factor
 
     def velocity(self, targets: Array, density: Array) -> Array:
@@ -211,7 +211,7 @@ def test_far_away_the_plain_rule_is_as_good() -> None:
     ellipse, membrane, parameters = ellipse_and_membrane(0.9, 128)
     targets = membrane.points[:, ::8] + 10 * membrane.spacing * membrane.outward[:, ::8]
     plain = np.empty((3, targets.shape[1], membrane.size))
-    stokeslets(targets, membrane.points, *plain)
+    stokeslets(targets, membrane.points, plain)
     forces = smooth(ellipse, parameters) * membrane.spacing
     expected = applied(plain, forces)
     computed = applied(membrane.components(targets), forces)

@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 
 METHODS = [
     Numerics(integrator="bdf"),
+    Numerics(integrator="rosenbrock"),
     Numerics(integrator="sdc", order=3),
     Numerics(integrator="sdc", order=4),
     Numerics(integrator="sdc", order=5),
@@ -43,7 +44,7 @@ def integrator(
     end: float,
 ) -> Integrator:
     numerics = method.model_copy(update={"tolerance": tolerance})
-    return integrator_for(numerics, rate, lambda _: jacobian, lambda y: y[:1], start, end)
+    return integrator_for(numerics, 2, rate, lambda _: jacobian, lambda y: y[:1], start, end)
 
 
 def rotation(method: Numerics, tolerance: float, end: float = 6.0) -> Integrator:
@@ -57,6 +58,22 @@ def final_error(method: Numerics, tolerance: float) -> tuple[float, int]:
         steps += 1
         if step.end == 6.0:
             return float(np.max(np.abs(step.state - exact(6.0)))), steps
+
+
+@every_method
+def test_it_begins_and_ends_when_told(method: Numerics) -> None:
+    numerics = method.model_copy(update={"tolerance": 1e-6})
+    stepper = integrator_for(
+        numerics, 2, lambda y: MATRIX @ y, lambda _: MATRIX, lambda y: y[:1], exact(2.0), 6.0, start=2.0
+    )
+    step = stepper.step()
+    assert step.start == 2.0
+    np.testing.assert_allclose(step.interpolate(2.0), exact(2.0), rtol=0, atol=1e-6)
+    while step.end < 6.0:
+        assert step.end > step.start
+        step = stepper.step()
+    assert step.end == 6.0
+    np.testing.assert_allclose(step.state, exact(6.0), rtol=0, atol=1e-4)
 
 
 @every_method

@@ -155,7 +155,7 @@ FULL = Scene(
     adhesion=Adhesion(hamaker=2 / 3, distance=0.4, exponents=(12, 6)),
     flow=Trap(rate=0.09),
     start=Start(relaxed=True, tilt=1e-2),
-    numerics=Numerics(points=96, tolerance=3e-7, work_limit=5000),
+    numerics=Numerics(points=96, tolerance=3e-7, integrator="bdf", work_limit=5000),
     criteria=Criteria(separated_distance=8.0, revolutions=3),
     output=Output(interval=0.1, frame_interval=0.7),
 )

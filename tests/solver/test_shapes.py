@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from solver.curve import positions
-from solver.shapes import ellipse_tangent_angle, semi_axes
+from solver.curve import area, positions, tangents
+from solver.shapes import ellipse_tangent_angle, of_reduced_area, semi_axes
 from tests.solver.references import Ellipse
+
+Array = NDArray[np.float64]
 
 REDUCED_AREAS = [0.2, 0.5, 0.65, 0.9, 0.9044, 0.985, 1 - 1e-9, 1.0]
 LENGTHS = [2 * np.pi, 0.7, 25.0]
@@ -25,8 +28,7 @@ def test_semi_axes_are_exact(reduced_area: float, length: float) -> None:
     major, minor = semi_axes(reduced_area, length)
     assert major >= minor > 0
     assert perimeter(major, minor) == pytest.approx(length, rel=4e-15)
-    area = np.pi * major * minor
-    assert 4 * np.pi * area / length**2 == pytest.approx(reduced_area, rel=4e-15)
+    assert 4 * np.pi * (np.pi * major * minor) / length**2 == pytest.approx(reduced_area, rel=4e-15)
 
 
 @pytest.mark.parametrize("points", [16, 64])
@@ -51,6 +53,26 @@ def test_the_curve_is_the_ellipse_with_its_first_point_at_the_tip(angle: float) 
     np.testing.assert_allclose(points, ellipse.points(ellipse.parameters(tangent_angle)), rtol=0, atol=1e-13)
     tip = center + ellipse.major * np.array([np.cos(angle), np.sin(angle)])
     np.testing.assert_allclose(points[:, 0], tip, rtol=0, atol=1e-13)
+
+
+def reduced_area_of(tangent_angle: Array) -> float:
+    place = positions(tangent_angle, np.zeros(2), 2 * np.pi)
+    return float(area(place, tangents(tangent_angle), 2 * np.pi)) / np.pi
+
+
+@pytest.mark.parametrize(("reduced_area", "points"), [(0.3, 64), (0.45, 128), (0.9, 32), (0.999999, 64)])
+def test_the_reduced_area_is_exact_where_the_tips_are_not_resolved(reduced_area: float, points: int) -> None:
+    sampled = ellipse_tangent_angle(reduced_area, 2 * np.pi, 0.7, points)
+    exact = of_reduced_area(sampled, reduced_area)
+    assert reduced_area_of(exact) == pytest.approx(reduced_area, abs=1e-14)
+    miss = abs(reduced_area_of(sampled) - reduced_area)
+    assert np.max(np.abs(exact - sampled)) < 3 * miss + 1e-12
+
+
+def test_what_is_resolved_is_left_alone() -> None:
+    for reduced_area in (1.0, 0.95, 0.8):
+        sampled = ellipse_tangent_angle(reduced_area, 2 * np.pi, 0.7, 256)
+        np.testing.assert_allclose(of_reduced_area(sampled, reduced_area), sampled, rtol=0, atol=2e-13)
 
 
 def test_the_tangent_turns_once_counterclockwise() -> None:

@@ -9,7 +9,14 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import quad
 
-from solver.spectral import differentiation, integration, interpolation, logarithm_weights, tail
+from solver.spectral import (
+    differentiation,
+    integration,
+    interpolation,
+    logarithm_weights,
+    resampled,
+    tail,
+)
 
 Array = NDArray[np.float64]
 Function = Callable[[Array], Array]
@@ -73,6 +80,21 @@ def test_interpolation_is_exact(points: int, factor: int) -> None:
 def test_interpolation_keeps_the_values_at_the_points() -> None:
     values = np.random.default_rng(1).standard_normal(32)  # the highest mode included
     np.testing.assert_allclose((interpolation(32, 4) @ values)[::4], values, rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize(("points", "finer"), [(16, 18), (32, 48), (48, 64), (64, 512), (64, 64)])
+def test_resampling_is_exact(points: int, finer: int) -> None:
+    polynomials = [Polynomial(points // 2 - 1, seed) for seed in range(3)]
+    coarse = np.array([polynomial(angles(points)) for polynomial in polynomials])
+    fine = np.array([polynomial(angles(finer)) for polynomial in polynomials])
+    np.testing.assert_allclose(resampled(coarse, finer), fine, rtol=0, atol=1e-12)
+
+
+def test_resampling_is_interpolation() -> None:
+    values = np.random.default_rng(2).standard_normal((3, 32))  # the highest mode included
+    np.testing.assert_allclose(
+        resampled(values, 96), values @ interpolation(32, 3).T, rtol=0, atol=1e-14 * 32
+    )
 
 
 def logarithmic_integral(function: Function, alpha: float) -> float:

@@ -1,0 +1,27 @@
+"""A pair that a half turn about the origin leaves as it is needs only half the work.
+
+Every flow here and all forces keep such a symmetry, so the second vesicle stays the image of the first: its
+points are −x, its tangents −t and the forces on it −f.  Only the first is computed, as it moves among all.
+"""
+
+from __future__ import annotations
+
+import math
+
+from solver.scene import Scene, Vesicle
+
+
+def has_images(scene: Scene) -> bool:
+    """Whether the scene is a vesicle and its image."""
+    if len(scene.vesicles) != 2:
+        return False
+    first, second = scene.vesicles
+    alike = second.model_copy(update={"center": first.center, "angle": first.angle}) == first
+    opposite = all(a == -b for a, b in zip(first.center, second.center, strict=True))
+    aligned = abs(math.remainder(first.angle - second.angle, math.pi)) < 1e-12  # ellipses
+    return alike and opposite and aligned
+
+
+def independent_vesicles(scene: Scene) -> tuple[Vesicle, ...]:
+    """The vesicles that have to be computed: all, or those that are not images."""
+    return scene.vesicles[:1] if has_images(scene) else scene.vesicles
