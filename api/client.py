@@ -132,8 +132,8 @@ class StoredRun:
 
     def _frames(self) -> tuple[Array, Array]:
         """Times of the frames; x, y and tension of all points of each vesicle."""
-        scene = self.summary.scene
-        vesicles, points = len(scene.vesicles), scene.numerics.points
+        vesicles, points = len(self.summary.scene.vesicles), self.summary.work.points
+        assert points is not None
         octets = self._client.get(
             f"/runs/{self.summary.key}/frames", headers={"Accept": "application/octet-stream"}
         ).content

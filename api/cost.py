@@ -11,6 +11,8 @@ from ensemble.grid import GeometricGrid
 from ensemble.study import Study
 from solver.scene import Scene
 
+_AUTOMATIC_POINTS = 128  # what "auto" is taken for: most scenes end with fewer
+
 
 def estimate(asked: Study | Scene, maximum: float) -> Estimate:
     """Estimate the cost of a study or a scene and compare it with the maximum.
@@ -26,7 +28,8 @@ def _of_run(scene: Scene) -> float:
     time = scene.horizon * scene.criteria.extensions
     if scene.start.relaxed:
         time += scene.start.horizon
-    return float(len(scene.vesicles) * scene.numerics.points * time)
+    points = scene.numerics.points
+    return float(len(scene.vesicles) * (_AUTOMATIC_POINTS if points == "auto" else points) * time)
 
 
 def _of_study(study: Study) -> tuple[int, float]:

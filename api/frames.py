@@ -41,7 +41,7 @@ def select_frames(run: Run, start: int, stop: int, stride: int, most_values: int
     """
     frames, total = run.frames, len(run.frames.time)
     chosen = list(range(total)[start:stop:stride])
-    values_each = 1 + 3 * len(run.scene.vesicles) * run.scene.numerics.points
+    values_each = 1 + 3 * math.prod(frames.tangent_angle.shape[1:])
     most_frames = max(most_values // values_each, 1)
     if len(chosen) > most_frames:
         raise BadInput(f"stride: leaves {len(chosen)} frames — must leave at most {most_frames} of this run")

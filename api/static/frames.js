@@ -38,9 +38,9 @@ export class Frames {
    * @param {any} run - Its summary.
    * @param {AbortSignal} signal
    */
-  static async of({ key, scene }, signal) {
+  static async of({ key, scene, work }, signal) {
     const numbers = await getNumbers(`/runs/${key}/frames`, signal);
-    return new Frames(numbers, scene.vesicles.length, scene.numerics.points);
+    return new Frames(numbers, scene.vesicles.length, work.points);
   }
 
   /** Time of the last frame. */
