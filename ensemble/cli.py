@@ -62,6 +62,21 @@ class Kind(StrEnum):
     BOUNDARIES = "boundaries"
 
 
+class ProgressFormat(StrEnum):
+    """Whom progress is shown to: people, or a program."""
+
+    TEXT = "text"
+    JSON = "json"
+
+
+ProgressAs = Annotated[
+    ProgressFormat,
+    typer.Option(
+        "--progress", help="How to tell progress on standard error: for people, or in lines of JSON."
+    ),
+]
+
+
 def main() -> None:
     """Run the command line; exit status 2 and one message for bad input."""
     pin_threads()
@@ -84,6 +99,7 @@ def bisect(
     certify: Annotated[
         bool, typer.Option("--certify", help="Run both ends of every bracket again at finer numerics.")
     ] = False,
+    progress: ProgressAs = ProgressFormat.TEXT,
     as_json: AsJson = False,
 ) -> None:
     """Trace a boundary, on all ranks, running only what the store does not have.
@@ -98,7 +114,7 @@ def bisect(
     communicator = world()
     with abort_guard(communicator):
         prepared = on_root(communicator, lambda: _prepare(study, changes, tolerance, certify, store))
-        traced = _trace(communicator, prepared, store)
+        traced = _trace(communicator, prepared, store, progress)
     if as_json:
         _print_json(study_document(traced, store))
     else:
@@ -119,14 +135,15 @@ def _prepare(study: str, changes: list[str], tolerance: float | None, certify: b
     return loaded
 
 
-def _trace(communicator: Intracomm, study: Study, path: Path) -> Traced:
+def _trace(communicator: Intracomm, study: Study, path: Path, progress: ProgressFormat) -> Traced:
     from rich.console import Console
 
-    from ensemble.progress import study_progress
+    from ensemble.progress import study_lines, study_progress
     from ensemble.scheduler import trace
     from ensemble.store import Store
 
-    with Store.existing(path) as store, study_progress(Console(stderr=True)) as show:
+    shown = study_lines if progress is ProgressFormat.JSON else study_progress
+    with Store.existing(path) as store, shown(Console(stderr=True)) as show:
         return trace(communicator, study, store, show)
 
 
@@ -143,15 +160,17 @@ def run(
     scene: Annotated[str, typer.Argument(help="Name of a preset, or a TOML file.")],
     changes: Changes = [],  # noqa: B006
     store: Annotated[Path | None, typer.Option(metavar="DIR", help="Keep the run in this store.")] = None,
+    progress: ProgressAs = ProgressFormat.TEXT,
     as_json: AsJson = False,
 ) -> None:
-    """Simulate one scene.  The exit status is 1 if the simulation failed numerically."""
+    """Simulate one scene, unless the store has the run.  The exit status is 1 if it failed numerically."""
     if launched_rank() != 0:
         return
     from rich.console import Console
 
     from ensemble.documents import run_document
-    from ensemble.progress import run_progress
+    from ensemble.keys import run_key
+    from ensemble.progress import run_lines, run_progress
     from ensemble.record import RunSummary
     from ensemble.study import load_scene
     from ensemble.tables import run_table
@@ -162,15 +181,20 @@ def run(
         with _refusing():
             loaded = load_scene(scene, changes)
             keep = None if store is None else stack.enter_context(_opened(store))
-        finished = simulate(loaded, on_progress=stack.enter_context(run_progress(Console(stderr=True))))
-        if keep is not None:
-            keep.save(finished)
-    document = run_document(RunSummary.of(finished))
+        if keep is not None and keep.contains(run_key(loaded)):
+            summary = keep.summary(run_key(loaded))
+        else:
+            shown = run_lines if progress is ProgressFormat.JSON else run_progress
+            finished = simulate(loaded, on_progress=stack.enter_context(shown(Console(stderr=True))))
+            if keep is not None:
+                keep.save(finished)
+            summary = RunSummary.of(finished)
+    document = run_document(summary)
     if as_json:
         _print_json(document)
     else:
         _print_table(run_table(document))
-    raise typer.Exit(1 if finished.outcome is Outcome.FAILED else 0)
+    raise typer.Exit(1 if summary.outcome is Outcome.FAILED else 0)
 
 
 @app.command()

@@ -172,7 +172,11 @@ def explain(error: ValidationError, document: Mapping[str, Any]) -> str:
         For example ``vesicles.0.reduced_area: 1.2 — input should be less than or equal to 1``; several
         problems are separated by semicolons.
     """
-    problems = error.errors(include_url=False)
+    return describe(error.errors(include_url=False), document)
+
+
+def describe(problems: Sequence[ErrorDetails], document: Mapping[str, Any]) -> str:
+    """Say on one line what pydantic found wrong with a document, as `explain` does."""
     # Refused elements make pydantic complain about the array around them, too: that is no news.
     around = {problem["loc"][:depth] for problem in problems for depth in range(len(problem["loc"]))}
     return "; ".join(_line(problem, document) for problem in problems if problem["loc"] not in around)

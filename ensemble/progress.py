@@ -1,6 +1,7 @@
 """Shows people, on standard error, where a study or a simulation stands.
 
 On a terminal it is a table or a bar that changes in place, elsewhere (a log file, a batch job) plain lines.
+For a program that has started this one, it is a line of JSON now and then.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from contextlib import contextmanager
 from datetime import timedelta
 from typing import TYPE_CHECKING
 
+from pydantic import BaseModel, ConfigDict, Field
 from rich.console import Console, Group
 from rich.live import Live
 from rich.progress import Progress
@@ -20,6 +22,47 @@ from ensemble.tables import boundary_cells, boundary_columns, bracket_text
 
 if TYPE_CHECKING:
     from ensemble.scheduler import Snapshot
+
+
+class ProgressLine(BaseModel):
+    """How far a study or a simulation has come, as a program reads it: one line of JSON."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    fraction: float = Field(ge=0, le=1)
+    message: str
+
+
+@contextmanager
+def study_lines(console: Console) -> Iterator[Callable[[Snapshot], None]]:
+    """Give a function that prints the latest snapshot of a study as a `ProgressLine`."""
+
+    def show(snapshot: Snapshot) -> None:
+        left = snapshot.seconds_left
+        fraction = 0.0 if left is None else snapshot.elapsed / (snapshot.elapsed + left)
+        _print_line(console, fraction, str(_summary(snapshot)))
+
+    yield show
+
+
+@contextmanager
+def run_lines(console: Console) -> Iterator[Callable[[float, float], None]]:
+    """Give a function that prints a `ProgressLine` whenever a simulation has come a percent further."""
+    shown = -1
+
+    def show(time: float, end: float) -> None:
+        nonlocal shown
+        percent = int(100 * time / end)
+        if percent != shown:
+            shown = percent
+            _print_line(console, min(time / end, 1.0), f"time {time:g} of {end:g}")
+
+    yield show
+
+
+def _print_line(console: Console, fraction: float, message: str) -> None:
+    line = ProgressLine(fraction=fraction, message=message)
+    console.print(line.model_dump_json(), soft_wrap=True, highlight=False, markup=False)
 
 
 @contextmanager

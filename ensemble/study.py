@@ -5,12 +5,13 @@ Presets of studies and scenes ship with the package and are used by name.
 
 from __future__ import annotations
 
+import copy
 import hashlib
 import json
 import math
 import tomllib
 from collections.abc import Iterable, Mapping
-from functools import cached_property
+from functools import cache, cached_property
 from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Self, TypeVar
@@ -52,7 +53,7 @@ class Search(Model):
     """Which critical value is looked for: of what, within which limits, between which outcomes."""
 
     parameter: str  # dotted path in the scene
-    tolerance: float = Field(0.01, gt=0, le=0.5)  # relative width that the bracket stays below
+    tolerance: float = Field(0.01, ge=1e-9, le=0.5)  # relative width that the bracket stays below
     limits: Bracket
     guesses: tuple[Guess, ...] = ()  # to begin with, until two points of the boundary are known
     low: tuple[Outcome, ...] = Field(min_length=1)  # outcomes below the critical value
@@ -150,7 +151,7 @@ class Study(Model):
             If the scene does not allow one of them.
         """
         changes = {self.sweep.parameter: sweep_value, self.search.parameter: value}
-        return _validate(Scene, override(self._scene_document, changes))
+        return validated(Scene, override(self._scene_document, changes))
 
     def side(self, outcome: Outcome) -> Side:
         """Return the side of the critical value on which an outcome lies.
@@ -218,8 +219,7 @@ class Study(Model):
 
 def preset_names() -> tuple[str, ...]:
     """Return the names of the studies and scenes that ship with the package, sorted."""
-    presets = (files("ensemble") / "presets").iterdir()
-    return tuple(sorted(Path(preset.name).stem for preset in presets if preset.name.endswith(".toml")))
+    return tuple(sorted(_presets()))
 
 
 def load_study(
@@ -275,22 +275,59 @@ def load_scene(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Scene
 Document = TypeVar("Document", bound=Model)
 
 
+def preset_document(name: str) -> dict[str, Any]:
+    """Return the document of a preset as it is in its file.
+
+    Raises
+    ------
+    ValueError
+        If there is no such preset.
+    """
+    if name not in preset_names():
+        raise ValueError(f"{name!r} is not a preset; presets: {', '.join(preset_names())}")
+    return copy.deepcopy(_presets()[name])
+
+
+@cache
+def _presets() -> dict[str, dict[str, Any]]:
+    # They do not change, and the service is asked for them hundreds of times a second.
+    found = (preset for preset in (files("ensemble") / "presets").iterdir() if preset.name.endswith(".toml"))
+    return {Path(preset.name).stem: tomllib.loads(preset.read_text(encoding="utf-8")) for preset in found}
+
+
 def _load(model: type[Document], name_or_path: str | Path, changes: Mapping[str, Any]) -> Document:
-    if str(name_or_path) in preset_names():
-        source = files("ensemble") / "presets" / f"{name_or_path}.toml"
-    elif Path(name_or_path).is_file():
-        source = Path(name_or_path)
-    else:
-        raise ValueError(
-            f"{str(name_or_path)!r} is neither a file nor a preset; presets: {', '.join(preset_names())}"
-        )
+    document = _read(name_or_path)
     try:
-        return _validate(model, override(tomllib.loads(source.read_text(encoding="utf-8")), changes))
+        return validated(model, override(document, changes))
     except ValueError as error:
         raise ValueError(f"{name_or_path}: {error}") from error
 
 
-def _validate(model: type[Document], document: Mapping[str, Any]) -> Document:
+def _read(name_or_path: str | Path) -> dict[str, Any]:
+    if str(name_or_path) in preset_names():
+        return preset_document(str(name_or_path))
+    if Path(name_or_path).is_file():
+        return _toml(Path(name_or_path))
+    raise ValueError(
+        f"{str(name_or_path)!r} is neither a file nor a preset; presets: {', '.join(preset_names())}"
+    )
+
+
+def _toml(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from error
+
+
+def validated(model: type[Document], document: Mapping[str, Any]) -> Document:
+    """Return the study or scene that a document describes.
+
+    Raises
+    ------
+    ValueError
+        If it describes none; names the fields.
+    """
     try:
         return model.model_validate(document)
     except ValidationError as error:

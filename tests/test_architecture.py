@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-PACKAGES = ("solver", "ensemble")
+PACKAGES = ("solver", "ensemble", "api")
 FORBIDDEN = {
     "solver": {
         "ensemble",
@@ -102,7 +102,7 @@ def test_the_wheel_ships_every_module_and_preset(wheel: set[str]) -> None:
     sources = {
         path.relative_to(ROOT).as_posix()
         for package in PACKAGES
-        for pattern in ("*.py", "presets/*.toml", "static/*")
+        for pattern in ("*.py", "presets/*.toml", "migrations/*.mako", "static/**/*")
         for path in (ROOT / package).rglob(pattern)
         if path.is_file()
     }

@@ -5,7 +5,7 @@ that last step makes it exist, so a process may die at any moment: what it ackno
 what it left behind is swept.  One lock file, held only for moments, keeps sweeping apart from committing.
 """
 
-from ensemble.store.errors import StoreError, StoreInputError
+from ensemble.store.errors import NotStored, StoreError, StoreInputError
 from ensemble.store.store import Staged, Store
 
-__all__ = ["Staged", "Store", "StoreError", "StoreInputError"]
+__all__ = ["NotStored", "Staged", "Store", "StoreError", "StoreInputError"]

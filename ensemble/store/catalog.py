@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import JSON, URL, Engine, create_engine, event, select
+from sqlalchemy import JSON, URL, Engine, bindparam, create_engine, event, select, tuple_
 from sqlalchemy.engine.interfaces import DBAPIConnection
 from sqlalchemy.orm import DeclarativeBase, Mapped, Session, mapped_column
 from sqlalchemy.pool import ConnectionPoolEntry
@@ -52,6 +52,10 @@ class BoundaryRow(Table):
     document: Mapped[dict[str, Any]]
 
 
+# Made once: to make a statement takes longer than to answer it.
+_DOCUMENT = select(RunRow.document).where(RunRow.key == bindparam("key"))
+
+
 def _durable(connection: DBAPIConnection, _: ConnectionPoolEntry) -> None:
     cursor = connection.cursor()
     cursor.execute("PRAGMA journal_mode=WAL")  # readers see the store while a study writes
@@ -89,7 +93,7 @@ class Catalog:
     def document(self, key: str) -> dict[str, Any] | None:
         """JSON of the summary of one run, None if there is no such run."""
         with Session(self._engine) as session:
-            return session.scalar(select(RunRow.document).where(RunRow.key == key))
+            return session.scalar(_DOCUMENT, {"key": key})
 
     def summaries(self, where: Sequence[str]) -> list[RunSummary]:
         """Summaries of the runs that meet all filters, oldest first."""
@@ -98,6 +102,16 @@ class Catalog:
             .where(*conditions(where, RunRow.document, RUN_FIELDS))
             .order_by(RunRow.created, RunRow.key)
         )
+        with Session(self._engine) as session:
+            return [RunSummary.model_validate(document) for document in session.scalars(query)]
+
+    def summaries_page(self, where: Sequence[str], after: str | None, limit: int) -> list[RunSummary]:
+        """Summaries of at most `limit` runs, newest first, from the one that follows run `after`."""
+        query = select(RunRow.document).where(*conditions(where, RunRow.document, RUN_FIELDS))
+        if after is not None:
+            last = select(RunRow.created, RunRow.key).where(RunRow.key == after).scalar_subquery()
+            query = query.where(tuple_(RunRow.created, RunRow.key) < last)
+        query = query.order_by(RunRow.created.desc(), RunRow.key.desc()).limit(limit)
         with Session(self._engine) as session:
             return [RunSummary.model_validate(document) for document in session.scalars(query)]
 
@@ -118,5 +132,21 @@ class Catalog:
             .where(*conditions(where, BoundaryRow.document, BOUNDARY_FIELDS))
             .order_by(BoundaryRow.updated, BoundaryRow.study_key)
         )
+        with Session(self._engine) as session:
+            return [Boundary.model_validate(document) for document in session.scalars(query)]
+
+    def boundary(self, study_key: str) -> Boundary | None:
+        """Boundary of one study, None if there is none."""
+        with Session(self._engine) as session:
+            row = session.get(BoundaryRow, study_key)
+            return None if row is None else Boundary.model_validate(row.document)
+
+    def boundaries_page(self, where: Sequence[str], after: str | None, limit: int) -> list[Boundary]:
+        """At most `limit` boundaries by ascending key, from the one that follows study `after`."""
+        # By key and not by time: a boundary that changes while somebody turns pages stays in its place.
+        query = select(BoundaryRow.document).where(*conditions(where, BoundaryRow.document, BOUNDARY_FIELDS))
+        if after is not None:
+            query = query.where(BoundaryRow.study_key > after)
+        query = query.order_by(BoundaryRow.study_key).limit(limit)
         with Session(self._engine) as session:
             return [Boundary.model_validate(document) for document in session.scalars(query)]

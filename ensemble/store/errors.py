@@ -11,3 +11,7 @@ class StoreError(EnsembleError):
 
 class StoreInputError(BadInput, ValueError):
     """The named store, run or filter is none; the message names it."""
+
+
+class NotStored(StoreInputError):  # noqa: N818
+    """The store has no run or boundary of that key."""

@@ -166,7 +166,9 @@ def condition(text: str, document: InstrumentedAttribute[Any], fields: Fields) -
     words = {word for kind in kinds if get_origin(kind) is Literal for word in get_args(kind)}
     numbers = kinds & {float, int}
     if numbers and value not in words:
-        number = _parse(value, path, Union[tuple(numbers)])  # noqa: UP007
+        _parse(value, path, Union[tuple(numbers)])  # noqa: UP007
+        # Compared as documents are, in double precision: SQL has no integers as long as Python's.
+        number = float(value)
         return and_(compare(element.as_float(), number), element.as_string().not_in([*NON_FINITE, *words]))
     if kinds == {datetime}:
         return compare(element.as_string(), timestamp_text(_parse(value, path, datetime)))

@@ -19,7 +19,7 @@ from ensemble.record import RunSummary
 from ensemble.store.archive import read_run, write_run
 from ensemble.store.catalog import Catalog
 from ensemble.store.check import check_run
-from ensemble.store.errors import StoreInputError
+from ensemble.store.errors import NotStored, StoreInputError
 from ensemble.store.staging import Writer, abandoned
 from solver.run import Outcome, Run
 
@@ -183,12 +183,12 @@ class Store:
 
         Raises
         ------
-        StoreInputError
+        NotStored
             If there is no such run.
         """
         document = self._catalog.document(key)
         if document is None:
-            raise StoreInputError(f"run: there is no run {key} in {self.path}")
+            raise NotStored(f"run: there is no run {key} in {self.path}")
         return RunSummary.model_validate(document)
 
     def load(self, key: str) -> Run:
@@ -196,13 +196,13 @@ class Store:
 
         Raises
         ------
-        StoreInputError
+        NotStored
             If there is no such run.
         StoreError
             If its files are damaged.
         """
         if not self.contains(key):
-            raise StoreInputError(f"run: there is no run {key} in {self.path}")
+            raise NotStored(f"run: there is no run {key} in {self.path}")
         return read_run(self._runs / key)
 
     def summaries(self, where: Sequence[str] = ()) -> list[RunSummary]:
@@ -221,6 +221,29 @@ class Store:
         """
         return self._catalog.summaries(where)
 
+    def summaries_page(
+        self, where: Sequence[str] = (), after: str | None = None, limit: int = 100
+    ) -> list[RunSummary]:
+        """A part of what `summaries` finds, newest first.
+
+        Parameters
+        ----------
+        where : sequence of str
+            Filters, as `summaries` takes them.
+        after : str, optional
+            Key of the last run of the part before; left out, the newest run is the first.
+        limit : int
+            How many runs at most.
+
+        Raises
+        ------
+        StoreInputError
+            If a filter is malformed, its field or value is none, or there is no run `after`.
+        """
+        if after is not None and not self.contains(after):
+            raise StoreInputError(f"after: there is no run {after}")
+        return self._catalog.summaries_page(where, after, limit)
+
     def save_boundary(self, boundary: Boundary) -> None:
         """Insert a boundary, or replace the one of the same study, at once."""
         with locked(self._lock):
@@ -235,6 +258,40 @@ class Store:
             If a filter is malformed, or its field or value is none.
         """
         return self._catalog.boundaries(where)
+
+    def boundary(self, study_key: str) -> Boundary:
+        """Boundary of one study.
+
+        Raises
+        ------
+        NotStored
+            If there is none.
+        """
+        boundary = self._catalog.boundary(study_key)
+        if boundary is None:
+            raise NotStored(f"boundary: there is no boundary {study_key} in {self.path}")
+        return boundary
+
+    def boundaries_page(
+        self, where: Sequence[str] = (), after: str | None = None, limit: int = 100
+    ) -> list[Boundary]:
+        """A part of what `boundaries` finds, by ascending key.
+
+        Parameters
+        ----------
+        where : sequence of str
+            Filters, as `boundaries` takes them.
+        after : str, optional
+            Key of the last study of the part before.
+        limit : int
+            How many boundaries at most.
+
+        Raises
+        ------
+        StoreInputError
+            If a filter is malformed, or its field or value is none.
+        """
+        return self._catalog.boundaries_page(where, after, limit)
 
     def check(self) -> list[str]:
         """Verify every run and boundary.

@@ -145,6 +145,26 @@ def test_run_without_a_store_keeps_nothing_and_repeats_the_same_numbers(ensemble
     assert document | {"wall_seconds": None} == kept | {"wall_seconds": None}
 
 
+def test_a_run_that_the_store_has_is_not_made_again(ensemble, stored_run):
+    store, document = stored_run
+    again = ensemble("run", *QUICK_SCENE, f"--store={store}", "--json")
+    assert json.loads(again.stdout) == document, "to the last bit of the time that it took"
+
+
+@pytest.mark.parametrize("command", ["run", "bisect"])
+def test_a_program_reads_progress_in_lines_of_json(ensemble, bisect_command, tmp_path, command):
+    study = bisect_command(tmp_path / "store")[3:]
+    arguments = study if command == "bisect" else ["run", *QUICK_SCENE, "--json"]
+    result = ensemble(*arguments, "--progress=json")
+    assert result.returncode == 0, result.stderr
+    json.loads(result.stdout)
+    lines = [json.loads(line) for line in result.stderr.splitlines()]
+    assert len(lines) > 5
+    assert all(line.keys() == {"fraction", "message"} for line in lines)
+    assert all(0 <= line["fraction"] <= 1 for line in lines)
+    assert any(0 < line["fraction"] < 1 for line in lines)
+
+
 def test_run_under_a_launcher_is_one_run(launcher, stored_run):
     result = launcher.run(2, [sys.executable, "-m", "ensemble.cli", "run", *QUICK_SCENE, "--json"])
     assert result.returncode == 0, result.stderr

@@ -1,0 +1,122 @@
+"""What is computed from the points of a boundary: a line through them, and values between them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial import Polynomial
+
+from api.schemas import BoundaryDocument, CriticalValueAt, Fit, Method
+from ensemble.boundary import Boundary, BoundaryPoint
+from ensemble.errors import BadInput
+from ensemble.search import Status
+
+FEWEST_TO_FIT = 3  # two points lie on a line whatever the physics
+
+
+@dataclass(frozen=True)
+class _Known:
+    """A point whose bracket is closed, and the value of the swept parameter there."""
+
+    at: float
+    value: float
+    low: float
+    high: float
+    point: BoundaryPoint
+
+
+def _known(boundary: Boundary) -> list[_Known]:
+    swept = boundary.study["sweep"]["parameter"]
+    points = [
+        _Known(point.parameters[swept], point.critical_value, low, high, point)
+        for point in boundary.points
+        if point.status == Status.CONVERGED and point.critical_value is not None
+        for low, high in [point.bracket]
+        if low is not None and high is not None
+    ]
+    return sorted(points, key=lambda known: known.at)
+
+
+def boundary_document(boundary: Boundary) -> BoundaryDocument:
+    """Add to a boundary what is computed from its points."""
+    return BoundaryDocument.model_validate(boundary.model_dump() | {"fit": fit(boundary)})
+
+
+def fit(boundary: Boundary) -> Fit | None:
+    """Fit a straight line to the converged points, if there are three or more."""
+    known = _known(boundary)
+    if len(known) < FEWEST_TO_FIT:
+        return None
+    line = Polynomial.fit([point.at for point in known], [point.value for point in known], deg=1)
+    intercept, slope = line.convert().coef
+    return Fit(intercept=float(intercept), slope=float(slope))
+
+
+def critical_value_at(boundary: Boundary, parameters: Mapping[str, float], method: Method) -> CriticalValueAt:
+    """Read a critical value off the converged points of a boundary.
+
+    Parameters
+    ----------
+    boundary : Boundary
+    parameters : mapping
+        Value of the swept parameter, by its dotted path.
+    method : Method
+        Between two points, or of the nearest one.
+
+    Raises
+    ------
+    BadInput
+        If the parameters are not those of the boundary, or lie outside of what is known of it.
+    """
+    swept = boundary.study["sweep"]["parameter"]
+    if parameters.keys() != {swept}:
+        raise BadInput(f"give a value of {swept} and of nothing else")
+    known = _known(boundary)
+    if not known:
+        raise BadInput(f"{swept}: no point of this boundary has converged yet")
+    at = parameters[swept]
+    nearest = min(known, key=lambda point: abs(point.at - at))
+    if method is Method.NEAREST or nearest.at == at:
+        return CriticalValueAt(
+            parameters=nearest.point.parameters,
+            critical_value=nearest.value,
+            uncertainty=(nearest.low, nearest.high),
+            method=method,
+            points=[nearest.point.parameters],
+        )
+    if not known[0].at < at < known[-1].at:
+        raise BadInput(
+            f"{swept}: {at:g} — must lie within [{known[0].at:g}, {known[-1].at:g}], or ask for the nearest"
+        )
+    return _between(known, swept, at)
+
+
+def _between(known: list[_Known], swept: str, at: float) -> CriticalValueAt:
+    above = next(index for index, point in enumerate(known) if point.at > at)
+    left, right = known[above - 1], known[above]
+    ends = [left.at, right.at]
+    value, low, high = (
+        float(np.interp(at, ends, [getattr(left, name), getattr(right, name)]))
+        for name in ("value", "low", "high")
+    )
+    bend = _bend(known, above, at, value)
+    return CriticalValueAt(
+        parameters={swept: at},
+        critical_value=value,
+        uncertainty=(max(low - bend, 0.0), high + bend),
+        method=Method.INTERPOLATED,
+        points=[left.point.parameters, right.point.parameters],
+    )
+
+
+def _bend(known: list[_Known], above: int, at: float, value: float) -> float:
+    """How far a parabola through the two neighbors and the next point leaves the line; the worse of two."""
+    starts = [start for start in (above - 2, above - 1) if start >= 0 and start + 3 <= len(known)]
+    triples = [known[start : start + 3] for start in starts]
+    parabolas = [
+        Polynomial.fit([point.at for point in triple], [point.value for point in triple], deg=2)
+        for triple in triples
+    ]
+    return max((abs(float(parabola(at)) - value) for parabola in parabolas), default=0.0)

@@ -1,0 +1,117 @@
+"""The commands that this package adds to the command line.
+
+Every command imports what it needs when it is called, as those of `ensemble` do.
+"""
+
+from __future__ import annotations
+
+from datetime import timedelta
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from api.scope import Scope
+from ensemble.cli import DEFAULT_STORE, StorePath
+from ensemble.errors import BadInput
+
+if TYPE_CHECKING:
+    from api.settings import Settings
+
+
+class TokenAction(StrEnum):
+    """What can be done about tokens."""
+
+    CREATE = "create"
+    LIST = "list"
+    REVOKE = "revoke"
+
+
+def serve(
+    host: Annotated[str, typer.Option(help="Address to listen at.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen at; 0: a free one.")] = 8000,
+    store: StorePath = DEFAULT_STORE,
+    workers: Annotated[int, typer.Option(min=0, help="Workers to run jobs beside the server.")] = 1,
+) -> None:
+    """Serve jobs, runs and boundaries over HTTP, with a page to look at them."""
+    import api.serve
+
+    api.serve.serve(_settings(store), host, port, workers)
+
+
+def worker(
+    store: StorePath = DEFAULT_STORE,
+    end_with_input: Annotated[
+        bool, typer.Option("--end-with-input", help="End when standard input does.")
+    ] = False,
+) -> None:
+    """Carry out jobs, one after the other; any number of workers may share a store and its database.
+
+    When it ends, by a signal or otherwise, so do the processes of its job, and another worker continues it.
+    """
+    import logging
+    import signal
+    import sys
+    import threading
+
+    from api.database import Database
+    from api.jobs import Jobs
+    from api.worker import Worker
+    from ensemble.store import Store
+
+    logging.basicConfig(format="%(asctime)s %(message)s")
+    logging.getLogger("api").setLevel(logging.INFO)
+    stop = threading.Event()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: stop.set())
+
+    def wait_for_end_of_input() -> None:
+        sys.stdin.read()
+        stop.set()
+
+    if end_with_input:
+        threading.Thread(target=wait_for_end_of_input, daemon=True).start()
+    settings = _settings(store)
+    with Store.open(store) as opened, Database.open(settings.database_url, opened.path) as database:
+        Worker(Jobs(database, opened.path), opened.path).run(stop)
+
+
+def token(
+    action: Annotated[TokenAction, typer.Argument(help="What to do.")],
+    name: Annotated[
+        str, typer.Argument(metavar="[USER|ID]", help="The user to create one for, or the token to revoke.")
+    ] = "",
+    scope: Annotated[Scope, typer.Option(help="What the token allows.")] = Scope.SUBMIT,
+    days: Annotated[float, typer.Option(min=0.0, max=3650.0, help="How long it is valid.")] = 90.0,
+    store: StorePath = DEFAULT_STORE,
+) -> None:
+    """Create a bearer token, which is shown this once; list what there is; or revoke one."""
+    from rich.console import Console
+
+    from api.database import Database
+    from api.tokens import Tokens, tokens_table
+    from ensemble.store import Store
+
+    settings = _settings(store)
+    with Store.open(store) as opened, Database.open(settings.database_url, opened.path) as database:
+        tokens = Tokens(database)
+        if action is TokenAction.LIST:
+            Console().print(tokens_table(tokens.all()))
+        elif action is TokenAction.CREATE:
+            print(tokens.create(name, scope, timedelta(days=days)))
+        else:
+            tokens.revoke(name)
+
+
+def _settings(store: Path) -> Settings:
+    from pydantic import ValidationError
+
+    from api.settings import Settings
+
+    try:
+        return Settings(store=store)
+    except ValidationError as error:
+        (first, *_) = error.errors()
+        variable = "_".join(str(part) for part in ("ENSEMBLE", *first["loc"])).upper()
+        raise BadInput(f"{variable}: {first['msg']}") from error

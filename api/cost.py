@@ -1,0 +1,47 @@
+"""What a job may cost, before it is accepted: points × vesicles × time to simulate, over all of its runs."""
+
+from __future__ import annotations
+
+import math
+import sys
+
+from api.schemas import Estimate
+from ensemble.certification import finer
+from ensemble.grid import GeometricGrid
+from ensemble.study import Study
+from solver.scene import Scene
+
+_AUTOMATIC_POINTS = 128  # what "auto" is taken for: most scenes end with fewer
+
+
+def estimate(asked: Study | Scene, maximum: float) -> Estimate:
+    """Estimate the cost of a study or a scene and compare it with the maximum.
+
+    A run may go on to the end of its extended horizon; a search halves its limits down to its tolerance.
+    """
+    runs, cost = _of_study(asked) if isinstance(asked, Study) else (1, _of_run(asked))
+    # An infinite cost is above any maximum, but JSON has no word for it.
+    return Estimate(runs=runs, cost=min(cost, sys.float_info.max), maximum=maximum, accepted=cost <= maximum)
+
+
+def _of_run(scene: Scene) -> float:
+    time = scene.horizon * scene.criteria.extensions
+    if scene.start.relaxed:
+        time += scene.start.horizon
+    points = scene.numerics.points
+    return float(len(scene.vesicles) * (_AUTOMATIC_POINTS if points == "auto" else points) * time)
+
+
+def _of_study(study: Study) -> tuple[int, float]:
+    low, high = study.search.limits
+    candidates = len(GeometricGrid(study.search.tolerance).within(low, high))
+    searching = math.ceil(math.log2(candidates)) + 2  # both limits, then halves
+    runs, cost = 0, 0.0
+    for value in study.sweep.values:
+        dearest = max((study.scene_at(value, limit) for limit in (low, high)), key=_of_run)
+        runs += searching
+        cost += searching * _of_run(dearest)
+        if study.search.certify:
+            runs += 2
+            cost += 2 * _of_run(finer(dearest))
+    return runs, cost

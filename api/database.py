@@ -1,0 +1,111 @@
+"""The database of the service: SQLite in the store, or PostgreSQL by its URL."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from alembic import command
+from alembic.config import Config
+from sqlalchemy import Connection, Engine, create_engine, event, make_url
+from sqlalchemy.engine.interfaces import DBAPIConnection
+from sqlalchemy.exc import ArgumentError, DBAPIError, NoSuchModuleError
+from sqlalchemy.pool import ConnectionPoolEntry
+
+from ensemble.disk import locked
+from ensemble.errors import BadInput
+
+MIGRATIONS = "api:migrations"
+LOCK = "database.lock"
+BUSY_SECONDS = 60
+
+
+def _durable(connection: DBAPIConnection, _: ConnectionPoolEntry) -> None:
+    cursor = connection.cursor()
+    cursor.execute("PRAGMA journal_mode=WAL")  # readers wait for no writer
+    cursor.execute("PRAGMA synchronous=FULL")  # an acknowledged commit outlives a power failure
+    cursor.close()
+
+
+class Database:
+    """Connections to a database whose tables are up to date.  Get one from `Database.open`."""
+
+    def __init__(self, engine: Engine) -> None:
+        self._engine = engine
+        # SQLite takes one writer at a time and lets the others sleep; threads that queue here lose no time.
+        one_writer = engine.dialect.name == "sqlite"
+        self._turn: AbstractContextManager[object] = threading.Lock() if one_writer else nullcontext()
+
+    @classmethod
+    def open(cls, url: str, directory: Path) -> Self:
+        """Connect, and bring the tables up to date.
+
+        Parameters
+        ----------
+        url : str
+            For example ``sqlite:///jobs.sqlite`` or ``postgresql+psycopg://user@host/name``.
+        directory : Path
+            That all processes of the service share; a lock in it lets one of them at a time change tables.
+
+        Raises
+        ------
+        BadInput
+            If there is no such database or it cannot be used.
+        """
+        try:
+            database = cls(_engine(url))
+            with locked(directory / LOCK):
+                database._upgrade()
+        except (ArgumentError, NoSuchModuleError, ModuleNotFoundError) as error:
+            raise BadInput(f"database: {_first_line(error)}") from error
+        except DBAPIError as error:
+            raise BadInput(f"database: it cannot be used ({_first_line(error.orig)})") from error
+        return database
+
+    def _upgrade(self) -> None:
+        config = Config()
+        config.set_main_option("script_location", MIGRATIONS)
+        with self._engine.begin() as connection:
+            config.attributes["connection"] = connection
+            command.upgrade(config, "head")
+
+    @contextmanager
+    def begin(self) -> Iterator[Connection]:
+        """Give a connection for a change, which is durable when the block ends and undone if it fails."""
+        with self._turn, self._engine.begin() as connection:
+            yield connection
+
+    def connect(self) -> AbstractContextManager[Connection]:
+        """Give a connection for reading."""
+        return self._engine.connect()
+
+    def close(self) -> None:
+        """Close all connections."""
+        self._engine.dispose()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+def _engine(url: str) -> Engine:
+    if make_url(url).get_backend_name() != "sqlite":
+        return create_engine(url, pool_pre_ping=True)
+    engine = create_engine(url, connect_args={"timeout": BUSY_SECONDS})
+    event.listen(engine, "connect", _durable)
+    return engine
+
+
+def _first_line(error: BaseException | None) -> str:
+    return str(error).splitlines()[0]

@@ -1,0 +1,31 @@
+"""Whether the service is alive, and whether it can work."""
+
+from __future__ import annotations
+
+from http import HTTPStatus
+
+from fastapi import APIRouter
+from sqlalchemy.exc import SQLAlchemyError
+
+from api.problems import Problem, documented
+from api.schemas import Health
+from api.service import ServiceOf
+
+router = APIRouter(tags=["health"])
+
+
+@router.get("/healthz")
+async def alive() -> Health:
+    """Answer: the process lives."""
+    return Health(status="alive")
+
+
+@router.get("/readyz", responses=documented(HTTPStatus.SERVICE_UNAVAILABLE))
+def ready(service: ServiceOf) -> Health:
+    """Answer if the store and the database of jobs can be read."""
+    try:
+        service.jobs.counts()
+        service.store.boundaries_page(limit=1)
+    except SQLAlchemyError as error:
+        raise Problem(HTTPStatus.SERVICE_UNAVAILABLE, "the store or the database cannot be read") from error
+    return Health(status="ready")

@@ -1,0 +1,146 @@
+"""Jobs: submitted, watched, dismissed."""
+
+from __future__ import annotations
+
+from http import HTTPStatus
+from pathlib import Path as FilePath
+from typing import Annotated
+
+from fastapi import APIRouter, Header, Path, Query, Request, Response
+from fastapi.concurrency import run_in_threadpool
+from fastapi.responses import PlainTextResponse
+from sse_starlette import EventSourceResponse
+
+from api.auth import Reader, Submitter
+from api.caching import written
+from api.cost import estimate
+from api.description import reference
+from api.events import job_events
+from api.job import Job, NoSuchJob, Status, TooManyJobs
+from api.paging import Limit, page
+from api.problems import Problem, documented
+from api.schemas import Estimate, Page, Submission
+from api.scope import Scope
+from api.service import Service, ServiceOf
+from api.submissions import Submitted, requested
+from ensemble.errors import BadInput
+from ensemble.study import Study
+
+router = APIRouter(tags=["jobs"])
+
+JobKey = Annotated[str, Path(pattern="^[0-9a-z-]{1,64}$", description="Identifier of the job.")]
+LOG_BYTES = 1 << 20
+BODY = {"requestBody": {"required": True, "content": {"application/json": {"schema": reference(Submission)}}}}
+UNSUPPORTED = documented(HTTPStatus.UNSUPPORTED_MEDIA_TYPE)
+NO_SUCH_JOB = documented(HTTPStatus.NOT_FOUND)
+
+
+@router.post("/estimate", openapi_extra=BODY, responses=UNSUPPORTED)
+def estimate_cost(service: ServiceOf, reader: Reader, submission: Submitted) -> Estimate:
+    """Say what a job may cost, without submitting it."""
+    return estimate(requested(submission).model, service.settings.maximum_cost)
+
+
+@router.post("/jobs", status_code=HTTPStatus.ACCEPTED, openapi_extra=BODY, responses=UNSUPPORTED)
+def submit_job(
+    service: ServiceOf,
+    submitter: Submitter,
+    submission: Submitted,
+    response: Response,
+    idempotency_key: Annotated[
+        str | None,
+        Header(min_length=1, max_length=200, description="However often a request comes with it: one job."),
+    ] = None,
+) -> Job:
+    """Accept a job; it is on disk when this is answered."""
+    work = requested(submission)
+    ranks, seconds = _resources(service, submission, isinstance(work.model, Study))
+    cost = estimate(work.model, service.settings.maximum_cost)
+    if not cost.accepted:
+        raise Problem(
+            HTTPStatus.UNPROCESSABLE_ENTITY,
+            f"cost: {cost.cost:.3g} — must be at most {cost.maximum:.3g} "
+            "(points × vesicles × time to simulate, over all runs)",
+            cost=cost.cost,
+            maximum=cost.maximum,
+        )
+    try:
+        submitted = service.jobs.submit(
+            work, submitter.user, ranks, seconds, idempotency_key, service.settings.maximum_jobs
+        )
+    except TooManyJobs as error:
+        raise Problem(HTTPStatus.TOO_MANY_REQUESTS, str(error)) from error
+    response.headers["Location"] = f"/jobs/{submitted.job.id}"
+    return submitted.job
+
+
+def _resources(service: Service, submission: Submission, is_study: bool) -> tuple[int, float]:
+    settings = service.settings
+    ranks = submission.ranks or (settings.maximum_ranks if is_study else 1)
+    seconds = submission.seconds or settings.maximum_seconds
+    if ranks > settings.maximum_ranks:
+        raise BadInput(f"ranks: {ranks} — must be at most {settings.maximum_ranks}")
+    if seconds > settings.maximum_seconds:
+        raise BadInput(f"seconds: {seconds:g} — must be at most {settings.maximum_seconds:g}")
+    return ranks, seconds
+
+
+@router.get("/jobs", response_model=Page[Job])
+def list_jobs(
+    request: Request,
+    service: ServiceOf,
+    reader: Reader,
+    owner: Annotated[str | None, Query(max_length=64)] = None,
+    status: Status | None = None,
+    after: Annotated[
+        str | None, Query(pattern="^[0-9a-z-]{1,64}$", description="The job before the first.")
+    ] = None,
+    limit: Limit = 100,
+) -> Response:
+    """List the jobs, the latest first."""
+    try:
+        found = service.jobs.latest(limit + 1, after, owner, status)
+    except NoSuchJob:
+        raise BadInput(f"after: there is no job {after}") from None
+    return written(page(request, found, limit, key=lambda job: job.id))
+
+
+@router.get("/jobs/{identifier}", response_model=Job, responses=NO_SUCH_JOB)
+def get_job(service: ServiceOf, reader: Reader, identifier: JobKey) -> Response:
+    """Say where a job stands."""
+    return written(service.jobs.get(identifier))
+
+
+@router.delete("/jobs/{identifier}", responses=NO_SUCH_JOB)
+def dismiss_job(service: ServiceOf, submitter: Submitter, identifier: JobKey) -> Job:
+    """Give a job up: no process of it is left a moment later.  A finished job stays as it is."""
+    owner = service.jobs.get(identifier).owner
+    if submitter.user != owner and not submitter.scope.includes(Scope.ADMIN):
+        raise Problem(HTTPStatus.FORBIDDEN, "Authorization: only its owner or an admin may dismiss a job")
+    return service.jobs.dismiss(identifier)
+
+
+@router.get(
+    "/jobs/{identifier}/events",
+    response_class=EventSourceResponse,
+    responses=NO_SUCH_JOB
+    | {HTTPStatus.OK.value: {"description": "Server-sent events.", "content": {"text/event-stream": {}}}},
+)
+async def listen_to_job(service: ServiceOf, reader: Reader, identifier: JobKey) -> EventSourceResponse:
+    """Send the job as it is, and again each time it changes, until it has finished."""
+    job = await run_in_threadpool(service.jobs.get, identifier)
+    return EventSourceResponse(job_events(service, job))
+
+
+@router.get("/jobs/{identifier}/log", response_class=PlainTextResponse, responses=NO_SUCH_JOB)
+def get_log(service: ServiceOf, reader: Reader, identifier: JobKey) -> Response:
+    """Give what the job's processes have said so far; of a long log the end."""
+    return PlainTextResponse(_tail(service.jobs.log_path(service.jobs.get(identifier))))
+
+
+def _tail(path: FilePath) -> bytes:
+    if not path.exists():
+        return b""
+    with path.open("rb") as log:
+        log.seek(max(path.stat().st_size - LOG_BYTES, 0))
+        return log.read(LOG_BYTES)

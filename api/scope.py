@@ -1,0 +1,18 @@
+"""What a token allows."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+
+class Scope(StrEnum):
+    """To read; also to submit jobs and dismiss one's own; or everything."""
+
+    READ = "read"
+    SUBMIT = "submit"
+    ADMIN = "admin"
+
+    def includes(self, other: Scope) -> bool:
+        """Whether this one allows all that the other does."""
+        order = list(Scope)
+        return order.index(self) >= order.index(other)

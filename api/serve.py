@@ -1,0 +1,131 @@
+"""The server: the application under uvicorn, with workers beside it."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import subprocess
+import sys
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import AbstractAsyncContextManager, ExitStack, asynccontextmanager, contextmanager
+
+import uvicorn
+from anyio import to_thread
+from fastapi import FastAPI
+
+from api.app import create_app
+from api.auth import is_loopback
+from api.database import Database
+from api.jobs import Jobs
+from api.limits import RateLimits
+from api.protocol import impatient
+from api.service import Service
+from api.settings import Settings
+from api.tokens import Tokens
+from ensemble.errors import BadInput
+from ensemble.store import Store
+
+THREADS = 8  # that read and write; more of them would only wait for each other
+RESTART_SECONDS = 1.0
+STOP_SECONDS = 10.0  # that a worker has to end its job's processes
+DRAIN_SECONDS = 3  # that requests have to be answered when the server ends
+
+log = logging.getLogger("uvicorn.error")
+
+
+def serve(settings: Settings, host: str, port: int, workers: int) -> None:
+    """Serve until told to stop, with as many workers beside the server.
+
+    Raises
+    ------
+    BadInput
+        If the store or the database cannot be used, or the address is reached from elsewhere and there are
+        no tokens.
+    """
+    with opened(settings) as service:
+        if not service.needs_tokens and not is_loopback(host):
+            raise BadInput(
+                f"host: {host} can be reached from elsewhere, which needs tokens and there are none; "
+                "make one with `ensemble token create`"
+            )
+        app = create_app(service, lifespan=_beside_workers(service, workers))
+        uvicorn.Server(configuration(app, settings, host, port)).run()
+
+
+@contextmanager
+def opened(settings: Settings) -> Iterator[Service]:
+    """Open what a service needs; it asks for tokens if there are any, whether or not they have expired."""
+    with ExitStack() as stack:
+        store = stack.enter_context(Store.open(settings.store))
+        database = stack.enter_context(Database.open(settings.database_url, store.path))
+        tokens = Tokens(database)
+        yield Service(
+            settings=settings,
+            store=store,
+            jobs=Jobs(database, store.path),
+            tokens=tokens,
+            limits=RateLimits(settings.request_rate, settings.refusal_rate),
+            needs_tokens=bool(tokens.all()),
+        )
+
+
+def configuration(app: FastAPI, settings: Settings, host: str, port: int) -> uvicorn.Config:
+    """Say how the server treats its clients."""
+    return uvicorn.Config(
+        app,
+        host=host,
+        port=port,
+        http=impatient(settings.header_bytes, settings.header_seconds),
+        ws="none",
+        access_log=False,
+        server_header=False,
+        # A client may write what it likes into the headers that proxies use.
+        proxy_headers=False,
+        limit_concurrency=settings.connections,
+        timeout_graceful_shutdown=DRAIN_SECONDS,
+    )
+
+
+def _beside_workers(service: Service, workers: int) -> Callable[[FastAPI], AbstractAsyncContextManager[None]]:
+    command = [sys.executable, "-m", "ensemble.cli", "worker", "--end-with-input"]
+    command += ["--store", str(service.store.path)]
+
+    @asynccontextmanager
+    async def lifespan(_: FastAPI) -> AsyncIterator[None]:
+        if not service.needs_tokens:
+            log.warning("There are no tokens: whoever reaches this address may do everything.")
+        to_thread.current_default_thread_limiter().total_tokens = THREADS
+        tasks = [asyncio.create_task(_keep_running(command)) for _ in range(workers)]
+        try:
+            yield
+        finally:
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+
+    return lifespan
+
+
+async def _keep_running(command: list[str]) -> None:
+    """Run a worker, and another one whenever it ends, until cancelled."""
+    while True:
+        # Its end of the pipe tells a worker that the server is gone, however it went.
+        worker = await asyncio.create_subprocess_exec(*command, stdin=subprocess.PIPE, start_new_session=True)
+        try:
+            status = await worker.wait()
+        except asyncio.CancelledError:
+            await _stop(worker)
+            raise
+        log.error("A worker ended with status %s; starting another one.", status)
+        await asyncio.sleep(RESTART_SECONDS)
+
+
+async def _stop(worker: asyncio.subprocess.Process) -> None:
+    with contextlib.suppress(ProcessLookupError):
+        worker.terminate()
+    try:
+        await asyncio.wait_for(worker.wait(), STOP_SECONDS)
+    except TimeoutError:
+        worker.kill()
+        await worker.wait()

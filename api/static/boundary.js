@@ -1,0 +1,235 @@
+/** A boundary as it is being traced: its phase diagram, its points, its runs, and values read off it. */
+
+import { changesOf, get } from "./api.js";
+import { phaseDiagram } from "./diagram.js";
+import { definitions, element, table } from "./dom.js";
+import { interval, number, words } from "./format.js";
+import { outcomeLabel } from "./outcomes.js";
+import { Plot } from "./plot.js";
+import { alertAbout } from "./problems.js";
+import { goTo } from "./router.js";
+import { describe, quantity, valueAt } from "./symbols.js";
+
+/**
+ * @typedef {import("./diagram.js").Boundary} Boundary
+ * @typedef {import("./diagram.js").Point} Point
+ * @typedef {import("./diagram.js").Mark} Mark
+ */
+
+const SECONDS_BETWEEN_LOOKS = 0.5;
+const SEARCHING = "searching";
+
+/**
+ * Show a boundary, and go on showing how it changes.
+ *
+ * @param {HTMLElement} place
+ * @param {string} key
+ * @param {AbortSignal} signal
+ * @returns {Promise<void>} Done when the place is left.
+ */
+export async function followBoundary(place, key, signal) {
+  const marks = new Marks(signal);
+  let view = null;
+  for await (const boundary of changesOf(`/boundaries/${key}`, SECONDS_BETWEEN_LOOKS, signal)) {
+    const runs = await marks.of(boundary);
+    view ??= new BoundaryView(place, signal);
+    view.show(boundary, runs);
+  }
+}
+
+/** The runs behind a boundary; what is known of a run never changes, so each is asked for once. */
+class Marks {
+  /** @type {Map<string, Promise<any>>} */
+  #summaries = new Map();
+
+  /** @param {AbortSignal} signal */
+  constructor(signal) {
+    this.signal = signal;
+  }
+
+  /**
+   * @param {Boundary} boundary
+   * @returns {Promise<Mark[]>}
+   */
+  async of(boundary) {
+    const { sweep, search } = boundary.study;
+    const keys = boundary.points.flatMap((point) => point.runs);
+    const summaries = await Promise.all(keys.map((key) => this.#summary(key)));
+    return summaries.map(({ key, scene, outcome }) => ({
+      key,
+      outcome,
+      x: valueAt(scene, sweep.parameter),
+      y: valueAt(scene, search.parameter),
+    }));
+  }
+
+  /** @param {string} key */
+  #summary(key) {
+    const known = this.#summaries.get(key) ?? get(`/runs/${key}`, this.signal);
+    this.#summaries.set(key, known);
+    return known;
+  }
+}
+
+class BoundaryView {
+  /**
+   * @param {HTMLElement} place
+   * @param {AbortSignal} signal
+   */
+  constructor(place, signal) {
+    this.signal = signal;
+    this.heading = element("div", { class: "heading" });
+    this.figure = element("div", { class: "plot diagram", role: "img" });
+    this.points = element("section", { "aria-label": "Points of the boundary" });
+    this.runs = element("details", { class: "runs" });
+    this.reading = element("section", {});
+    this.plot = new Plot(this.figure, signal);
+    this.plot.on(
+      "plotly_click",
+      ({ points: [point] }) => point.customdata && goTo(`/runs/${point.customdata}`),
+    );
+    place.replaceChildren(
+      this.heading,
+      element(
+        "div",
+        { class: "columns" },
+        element("div", {}, this.figure, this.runs),
+        element("div", {}, this.points, this.reading),
+      ),
+    );
+  }
+
+  /**
+   * @param {Boundary} boundary
+   * @param {Mark[]} marks
+   */
+  show(boundary, marks) {
+    const { scene, sweep, search } = boundary.study;
+    const searching = boundary.points.filter((point) => point.status === SEARCHING).length;
+    const state = searching ? `tracing, ${searching} of ${boundary.points.length} open` : "complete";
+    this.heading.replaceChildren(
+      element("h1", {}, titleOf(boundary)),
+      element("span", { class: `state ${searching ? "live" : "done"}`, role: "status" }, state),
+      element("p", {}, `${words(boundary.name)}: ${describe(scene, [sweep.parameter, search.parameter])}`),
+    );
+    this.figure.setAttribute("aria-label", summary(boundary, marks));
+    void this.plot.draw(() => phaseDiagram(boundary, marks));
+    this.points.replaceChildren(pointsTable(boundary));
+    this.#showRuns(boundary, marks);
+    this.#offerReading(boundary);
+  }
+
+  /**
+   * @param {Boundary} boundary
+   * @param {Mark[]} marks
+   */
+  #showRuns(boundary, marks) {
+    const { scene, sweep, search } = boundary.study;
+    const symbols = [sweep.parameter, search.parameter].map((path) => quantity(path, scene).symbol);
+    const rows = marks.map(({ key, x, y, outcome }) => [
+      number(x),
+      number(y),
+      outcomeLabel(outcome),
+      element("a", { href: `#/runs/${key}` }, "Play"),
+    ]);
+    this.runs.replaceChildren(
+      element("summary", {}, `All ${marks.length} runs`),
+      table("Runs", [...symbols, "Outcome", "Run"], rows),
+    );
+  }
+
+  /** @param {Boundary} boundary */
+  #offerReading(boundary) {
+    const converged = boundary.points.filter((point) => point.status === "converged");
+    if (this.reading.hasChildNodes() || converged.length < 2) {
+      return;
+    }
+    this.reading.append(...readingForm(boundary, this.signal));
+  }
+}
+
+/** @param {Boundary} boundary */
+function titleOf({ study: { scene, sweep, search } }) {
+  return `Critical ${quantity(search.parameter, scene).name} against ${quantity(sweep.parameter, scene).name}`;
+}
+
+/**
+ * What the diagram shows, in words.
+ *
+ * @param {Boundary} boundary
+ * @param {Mark[]} marks
+ */
+function summary(boundary, marks) {
+  return `Phase diagram. ${titleOf(boundary)}: ${marks.length} runs, ${boundary.points.length} points of the boundary`;
+}
+
+/** @param {Boundary} boundary */
+function pointsTable(boundary) {
+  const { scene, sweep, search } = boundary.study;
+  const rows = boundary.points.map((point) => [
+    number(point.parameters[sweep.parameter]),
+    interval(point.bracket),
+    element("span", { class: `state ${stateOf(point)}` }, point.certified ? "certified" : point.status),
+  ]);
+  return table(
+    "Points of the boundary",
+    [
+      quantity(sweep.parameter, scene).symbol,
+      `Critical ${quantity(search.parameter, scene).symbol}`,
+      "Status",
+    ],
+    rows,
+  );
+}
+
+/** @param {Point} point */
+function stateOf({ status }) {
+  const states = /** @type {Record<string, string>} */ ({ [SEARCHING]: "live", converged: "done" });
+  return states[status] ?? "bad";
+}
+
+/**
+ * A form that reads the critical value off at a value of the swept parameter.
+ *
+ * @param {Boundary} boundary
+ * @param {AbortSignal} signal
+ */
+function readingForm(boundary, signal) {
+  const { scene, sweep, search } = boundary.study;
+  const [swept, searched] = [sweep.parameter, search.parameter].map((path) => quantity(path, scene));
+  const input = element("input", { id: "reading-at", type: "number", step: "any", required: true });
+  const answer = element("div", { "aria-live": "polite" });
+
+  /** @param {SubmitEvent} event */
+  async function read(event) {
+    event.preventDefault();
+    try {
+      const query = new URLSearchParams({ [sweep.parameter]: input.value });
+      const { critical_value, uncertainty, method } = await get(
+        `/boundaries/${boundary.study_key}/at?${query}`,
+        signal,
+      );
+      answer.replaceChildren(
+        definitions([
+          [`Critical ${searched.symbol}`, number(critical_value)],
+          ["Between", interval(uncertainty)],
+          ["Method", method],
+        ]),
+      );
+    } catch (error) {
+      answer.replaceChildren(alertAbout(error));
+    }
+  }
+
+  return [
+    element("h2", {}, "Read off a value"),
+    element(
+      "form",
+      { class: "inline", onsubmit: read },
+      element("label", { for: "reading-at" }, `At ${swept.name} ${swept.symbol}`),
+      input,
+      element("button", {}, "Read"),
+    ),
+    answer,
+  ];
+}

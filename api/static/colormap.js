@@ -1,0 +1,61 @@
+/** Colors of tensions: Matplotlib's plasma, without the end that would vanish on the page. */
+
+const PLASMA = [
+  [13, 8, 135],
+  [49, 5, 151],
+  [76, 2, 161],
+  [102, 0, 167],
+  [126, 3, 168],
+  [149, 17, 161],
+  [170, 35, 149],
+  [188, 53, 135],
+  [204, 71, 120],
+  [218, 90, 106],
+  [230, 108, 92],
+  [240, 128, 79],
+  [248, 149, 64],
+  [253, 172, 51],
+  [253, 197, 39],
+  [248, 223, 37],
+  [240, 249, 33],
+];
+const ON_LIGHT = [0, 0.86];
+const ON_DARK = [0.22, 1];
+
+/**
+ * @param {number} share - From 0 to 1; what lies beyond gets the color of the end.
+ * @param {boolean} isDark
+ * @returns {string}
+ */
+export function tensionColor(share, isDark) {
+  const [first, last] = isDark ? ON_DARK : ON_LIGHT;
+  const place = (first + (last - first) * Math.min(Math.max(share, 0), 1)) * (PLASMA.length - 1);
+  const below = Math.min(Math.floor(place), PLASMA.length - 2);
+  const mixed = PLASMA[below].map(
+    (value, channel) => value + (place - below) * (PLASMA[below + 1][channel] - value),
+  );
+  return `rgb(${mixed.map(Math.round).join(" ")})`;
+}
+
+/**
+ * The range of colors: all tensions but those of the first frame, if there are others.
+ *
+ * An ellipse that has not relaxed yet has tensions several times larger, which would leave a single color to the
+ * rest of the run.  The range is never so narrow that it would show rounding errors.
+ *
+ * @param {import("./frames.js").State[]} states
+ * @returns {[number, number]}
+ */
+export function tensionRange(states) {
+  let [low, high] = [Infinity, -Infinity];
+  for (const { membranes } of states.length > 1 ? states.slice(1) : states) {
+    for (const { tension } of membranes) {
+      for (const value of tension) {
+        low = Math.min(low, value);
+        high = Math.max(high, value);
+      }
+    }
+  }
+  const margin = Math.max(0, 1e-3 * (1 + Math.abs(low)) - (high - low)) / 2;
+  return [low - margin, high + margin];
+}

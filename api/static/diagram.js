@@ -1,0 +1,196 @@
+/**
+ * The phase diagram of a study: every run, the brackets of the boundary and a straight line through it.
+ *
+ * A pure function of what the service says; `Plot` draws it.
+ */
+
+import { number } from "./format.js";
+import { MARKS } from "./outcomes.js";
+import { axis } from "./plot.js";
+import { quantity } from "./symbols.js";
+import { color } from "./theme.js";
+
+/** @typedef {import("./plot.js").Figure} Figure */
+
+/**
+ * @typedef {object} Point - Of a boundary.
+ * @property {Record<string, number>} parameters
+ * @property {[number | null, number | null]} bracket
+ * @property {number | null} critical_value
+ * @property {[string | null, string | null]} outcomes
+ * @property {string} status
+ * @property {boolean} certified
+ * @property {string[]} runs
+ *
+ * @typedef {object} Boundary
+ * @property {string} study_key
+ * @property {any} study
+ * @property {string} name
+ * @property {Point[]} points
+ * @property {string} updated
+ * @property {{intercept: number, slope: number} | null} fit
+ *
+ * @typedef {object} Mark - A run in the plane of the two parameters.
+ * @property {string} key
+ * @property {number} x
+ * @property {number} y
+ * @property {string} outcome
+ */
+
+const LAST_IN_LEGEND = 2000; // Plotly gives traces 1000
+
+/**
+ * @param {Boundary} boundary
+ * @param {Mark[]} marks
+ * @returns {Figure}
+ */
+export function phaseDiagram(boundary, marks) {
+  const { scene, sweep, search } = boundary.study;
+  const x = quantity(sweep.parameter, scene);
+  const y = quantity(search.parameter, scene);
+  const points = boundary.points
+    .filter((point) => point.bracket.every((end) => end !== null))
+    .sort((first, second) => at(first, boundary) - at(second, boundary));
+  return {
+    data: [
+      ...fitLine(boundary, points, x.symbol, y.symbol),
+      ...runs(marks, x.symbol, y.symbol),
+      ...brackets(boundary, points),
+    ],
+    layout: {
+      height: 480,
+      margin: { l: 64, r: 16, t: 12, b: 56 },
+      xaxis: axis({ title: { text: title(x), standoff: 12 }, range: range(boundary, marks) }),
+      yaxis: axis({ title: { text: title(y), standoff: 12 }, rangemode: "normal" }),
+      legend: {
+        orientation: "h",
+        x: 0,
+        y: 1.02,
+        yanchor: "bottom",
+        font: { size: 12, color: color("muted") },
+      },
+      hovermode: "closest",
+    },
+  };
+}
+
+/** @param {{name: string, symbol: string}} quantity */
+function title({ name, symbol }) {
+  return name === symbol ? name : `${name} ${symbol}`;
+}
+
+/**
+ * @param {Point} point
+ * @param {Boundary} boundary
+ */
+function at(point, boundary) {
+  return point.parameters[boundary.study.sweep.parameter];
+}
+
+/**
+ * The whole sweep from the start, so that the axis rests while points come in.
+ *
+ * @param {Boundary} boundary
+ * @param {Mark[]} marks
+ */
+function range(boundary, marks) {
+  const all = [...boundary.study.sweep.values, ...marks.map((mark) => mark.x)];
+  const [low, high] = [Math.min(...all), Math.max(...all)];
+  const margin = 0.07 * (high - low) || 0.1 * Math.abs(high) || 1;
+  return [low - margin, high + margin];
+}
+
+/**
+ * @param {Mark[]} marks
+ * @param {string} x
+ * @param {string} y
+ */
+function runs(marks, x, y) {
+  return Object.entries(MARKS).flatMap(([outcome, { color: name, symbol }]) => {
+    const chosen = marks.filter((mark) => mark.outcome === outcome);
+    if (chosen.length === 0) {
+      return [];
+    }
+    const isOpen = symbol.endsWith("-open");
+    return {
+      type: "scatter",
+      mode: "markers",
+      name: outcome,
+      x: chosen.map((mark) => mark.x),
+      y: chosen.map((mark) => mark.y),
+      customdata: chosen.map((mark) => mark.key),
+      marker: {
+        symbol,
+        size: 9,
+        color: color(name),
+        line: { width: isOpen ? 1.6 : 0.8, color: color(isOpen ? name : "page") },
+      },
+      hovertemplate: `${outcome}<br>${x} = %{x:.4g}, ${y} = %{y:.4g}<extra></extra>`,
+    };
+  });
+}
+
+/**
+ * @param {Boundary} boundary
+ * @param {Point[]} points
+ */
+function brackets(boundary, points) {
+  if (points.length === 0) {
+    return [];
+  }
+  const ends = points.map((point) => /** @type {[number, number]} */ (point.bracket));
+  const certified = points.filter((point) => point.certified).length;
+  const bars = {
+    type: "scatter",
+    mode: "lines",
+    x: points.map((point) => at(point, boundary)),
+    y: ends.map(([low, high]) => (low + high) / 2),
+    line: { width: 0 },
+    error_y: {
+      type: "data",
+      array: ends.map(([low, high]) => (high - low) / 2),
+      color: color("ink"),
+      thickness: 1.2,
+      width: 8,
+    },
+    hoverinfo: "skip",
+    showlegend: false,
+  };
+  const inLegend = {
+    type: "scatter",
+    mode: "markers",
+    name: certified ? `bracket (${certified} of ${points.length} certified)` : "bracket",
+    x: [null],
+    y: [null],
+    marker: { symbol: "line-ns-open", size: 12, line: { width: 1.2 }, color: color("ink") },
+  };
+  return [bars, inLegend];
+}
+
+/**
+ * @param {Boundary} boundary
+ * @param {Point[]} points
+ * @param {string} x
+ * @param {string} y
+ */
+function fitLine(boundary, points, x, y) {
+  const { fit } = boundary;
+  if (fit === null || points.length === 0) {
+    return [];
+  }
+  const ends = [points[0], points[points.length - 1]].map((point) => at(point, boundary));
+  const sign = fit.intercept < 0 ? "−" : "+";
+  const line = `critical ${y} = ${number(fit.slope, 3)} ${x} ${sign} ${number(Math.abs(fit.intercept), 2)}`;
+  return [
+    {
+      type: "scatter",
+      mode: "lines",
+      name: line,
+      legendrank: LAST_IN_LEGEND, // and drawn first, below the runs
+      x: ends,
+      y: ends.map((end) => fit.intercept + fit.slope * end),
+      line: { color: color("muted"), width: 1.3, dash: "6px,4px" },
+      hoverinfo: "skip",
+    },
+  ];
+}

@@ -1,0 +1,92 @@
+/** Numbers, times and names as people read them. */
+
+/** @typedef {number | string | null | undefined} Maybe - The service writes numbers that are not finite as text. */
+
+/**
+ * A number with this many significant digits at most.
+ *
+ * @param {Maybe} value
+ * @param {number} [digits]
+ * @returns {string}
+ */
+export function number(value, digits = 4) {
+  if (typeof value !== "number") {
+    return value ?? "–";
+  }
+  const magnitude = Math.abs(value);
+  const isPlain = value === 0 || (magnitude >= 1e-3 && magnitude < 1e6);
+  return isPlain
+    ? withMinus(String(Number(value.toPrecision(digits))))
+    : powerOfTen(value, Math.min(digits, 3));
+}
+
+/**
+ * @param {number} value
+ * @param {number} digits
+ * @returns {string}
+ */
+function powerOfTen(value, digits) {
+  const [mantissa, exponent] = value.toExponential(digits - 1).split("e");
+  const raised = [...String(Number(exponent))].map((digit) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[Number(digit)] ?? "⁻").join("");
+  const factor = Number(mantissa);
+  return factor === 1 ? `10${raised}` : `${withMinus(String(factor))}\u00d710${raised}`;
+}
+
+/** @param {string} text */
+function withMinus(text) {
+  return text.replace("-", "\u2212");
+}
+
+/**
+ * The ends of a bracket, with as many digits as tell them apart.
+ *
+ * @param {[number | null, number | null]} bracket
+ * @returns {string}
+ */
+export function interval([low, high]) {
+  if (low === null && high === null) {
+    return "not bracketed";
+  }
+  if (low === null || high === null) {
+    return low === null ? `below ${number(high)}` : `above ${number(low)}`;
+  }
+  const decimals = Math.min(Math.max(1 - Math.floor(Math.log10(high - low || high)), 0), 10);
+  return `${low.toFixed(decimals)} – ${high.toFixed(decimals)}`;
+}
+
+/**
+ * A length of time.
+ *
+ * @param {number} seconds
+ * @returns {string}
+ */
+export function duration(seconds) {
+  if (seconds < 60) {
+    return `${number(seconds, seconds < 10 ? 2 : 3)} s`;
+  }
+  const minutes = Math.floor(seconds / 60);
+  return minutes < 60
+    ? `${minutes} min ${Math.round(seconds % 60)} s`
+    : `${Math.floor(minutes / 60)} h ${minutes % 60} min`;
+}
+
+const moments = new Intl.DateTimeFormat(undefined, { dateStyle: "medium", timeStyle: "short" });
+
+/**
+ * @param {string} moment - ISO 8601.
+ * @returns {string}
+ */
+export function dateAndTime(moment) {
+  return moments.format(new Date(moment));
+}
+
+/**
+ * The name of a preset or a study as words.
+ *
+ * @param {string} name
+ * @returns {string}
+ */
+export function words(name) {
+  const spaced = name.replaceAll(/[-_]/g, " ");
+  return spaced.charAt(0).toUpperCase() + spaced.slice(1);
+}

@@ -1,0 +1,138 @@
+/** The recorded states of a run, and the states between them. */
+
+import { getNumbers } from "./api.js";
+
+/**
+ * @typedef {object} Membrane
+ * @property {Float32Array} x
+ * @property {Float32Array} y
+ * @property {Float32Array} tension
+ *
+ * @typedef {object} State
+ * @property {number} time
+ * @property {Membrane[]} membranes
+ */
+
+const ROWS = /** @type {const} */ (["x", "y", "tension"]);
+
+/** Recorded states in the order of time, without those that are not finite, as a failed run may end with. */
+export class Frames {
+  /**
+   * @param {Float32Array} numbers - For each frame its time, then for each vesicle x, y and tension of all points.
+   * @param {number} vesicles
+   * @param {number} points - On each vesicle.
+   */
+  constructor(numbers, vesicles, points) {
+    const size = 1 + 3 * vesicles * points;
+    const starts = Array.from({ length: numbers.length / size }, (_, index) => index * size);
+    /** @type {State[]} */
+    this.states = starts
+      .map((start) => numbers.subarray(start, start + size))
+      .filter((frame) => frame.every(Number.isFinite))
+      .map((frame) => stateOf(frame, vesicles, points));
+  }
+
+  /**
+   * Ask for all frames of a run.
+   *
+   * @param {any} run - Its summary.
+   * @param {AbortSignal} signal
+   */
+  static async of({ key, scene, work }, signal) {
+    const numbers = await getNumbers(`/runs/${key}/frames`, signal);
+    return new Frames(numbers, scene.vesicles.length, work.points);
+  }
+
+  /** Time of the last frame. */
+  get end() {
+    return this.states[this.states.length - 1].time;
+  }
+
+  /**
+   * Index of the last frame at or before a time.
+   *
+   * @param {number} time
+   */
+  indexAt(time) {
+    const after = this.states.findIndex((state) => state.time > time);
+    return after < 0 ? this.states.length - 1 : Math.max(after - 1, 0);
+  }
+
+  /**
+   * The state at a time: a recorded one, or a cubic Hermite interpolation between two.
+   *
+   * @param {number} time
+   * @returns {State}
+   */
+  at(time) {
+    const index = this.indexAt(time);
+    const [left, right] = [this.states[index], this.states[index + 1]];
+    if (right === undefined || time <= left.time) {
+      return left;
+    }
+    const neighbors = [this.states[index - 1] ?? left, left, right, this.states[index + 2] ?? right];
+    const weights = hermiteWeights(
+      neighbors.map((state) => state.time),
+      time,
+    );
+    return {
+      time,
+      membranes: left.membranes.map((_, vesicle) =>
+        combine(
+          neighbors.map((state) => state.membranes[vesicle]),
+          weights,
+        ),
+      ),
+    };
+  }
+}
+
+/**
+ * @param {Float32Array} frame
+ * @param {number} vesicles
+ * @param {number} points
+ * @returns {State}
+ */
+function stateOf(frame, vesicles, points) {
+  const membranes = Array.from({ length: vesicles }, (_, vesicle) => {
+    const rows = ROWS.map((name, row) => {
+      const start = 1 + (3 * vesicle + row) * points;
+      return [name, frame.subarray(start, start + points)];
+    });
+    return /** @type {Membrane} */ (Object.fromEntries(rows));
+  });
+  return { time: frame[0], membranes };
+}
+
+/**
+ * Weights of four values in the cubic between the two inner ones, with the slopes of central differences.
+ *
+ * Where there is no outer value, the inner one stands in for it, and the slope there is one-sided.
+ *
+ * @param {number[]} times
+ * @param {number} time
+ * @returns {number[]}
+ */
+export function hermiteWeights([before, left, right, after], time) {
+  const length = right - left;
+  const s = (time - left) / length;
+  const [valueLeft, valueRight] = [(1 + 2 * s) * (1 - s) ** 2, s ** 2 * (3 - 2 * s)];
+  const slopeLeft = (s * (1 - s) ** 2 * length) / (right - before);
+  const slopeRight = (s ** 2 * (s - 1) * length) / (after - left);
+  return [-slopeLeft, valueLeft - slopeRight, valueRight + slopeLeft, slopeRight];
+}
+
+/**
+ * @param {Membrane[]} membranes
+ * @param {number[]} weights
+ * @returns {Membrane}
+ */
+function combine(membranes, weights) {
+  const rows = ROWS.map((name) => {
+    const sum = membranes[0][name].map((_, point) =>
+      weights.reduce((total, weight, index) => total + weight * membranes[index][name][point], 0),
+    );
+    return [name, sum];
+  });
+  return /** @type {Membrane} */ (Object.fromEntries(rows));
+}

@@ -1,0 +1,169 @@
+/** The diagnostics of a run against time, one below the other. */
+
+import { axis } from "./plot.js";
+import { color } from "./theme.js";
+
+/**
+ * @typedef {import("./plot.js").Figure} Figure
+ * @typedef {Record<string, (number | null)[]>} Series
+ *
+ * @typedef {object} Curve
+ * @property {string} series
+ * @property {string} name
+ * @property {string} color - Of `theme.css`.
+ *
+ * @typedef {object} Panel
+ * @property {string} title
+ * @property {Curve[]} curves
+ * @property {(value: number) => number} [convert]
+ * @property {(values: (number | null)[]) => object} [ticks] - Options of the axis, from the series as it is stored.
+ */
+
+const ANGLE_STEPS = [1, 2, 5, 10, 15, 30, 45, 90, 180, 360, 720]; // degrees between ticks
+const MOST_TICKS = 5;
+
+/** @param {number} radians */
+function degrees(radians) {
+  return (radians * 180) / Math.PI;
+}
+
+/** @param {(number | null)[]} angles - Radians. */
+function angleTicks(angles) {
+  const known = angles.filter((angle) => angle !== null);
+  const range = degrees(Math.max(...known) - Math.min(...known));
+  return {
+    dtick: ANGLE_STEPS.find((step) => range <= MOST_TICKS * step) ?? ANGLE_STEPS[ANGLE_STEPS.length - 1],
+  };
+}
+
+const ANGLE = { convert: degrees, ticks: angleTicks };
+
+/** Left out are curves, and panels, of which a run has no series. @type {Panel[]} */
+const PANELS = [
+  { title: "gap", curves: [{ series: "gap", name: "gap", color: "ink" }] },
+  {
+    title: "center angle (deg)",
+    curves: [{ series: "center_angle", name: "center angle", color: "ink" }],
+    ...ANGLE,
+  },
+  {
+    title: "inclination (deg)",
+    curves: [{ series: "inclination_angle", name: "inclination", color: "ink" }],
+    ...ANGLE,
+  },
+  {
+    title: "energy",
+    curves: [
+      { series: "bending_energy", name: "bending", color: "bound" },
+      { series: "adhesion_energy", name: "adhesion", color: "separated" },
+    ],
+  },
+  {
+    title: "viscosity [μ]",
+    curves: [
+      { series: "viscosity_bending_tension", name: "bending + tension", color: "bound" },
+      { series: "viscosity_adhesion", name: "adhesion", color: "separated" },
+    ],
+  },
+];
+/** Pixels around the axes, whatever their labels. */
+export const MARGIN = { l: 56, r: 12, t: 22, b: 44 };
+const PANEL_HEIGHT = 132; // pixels
+const GAP = 0.34; // between panels, as a share of one
+
+/**
+ * @param {Series} series
+ * @returns {Figure}
+ */
+export function histories(series) {
+  const panels = PANELS.map((panel) => ({
+    ...panel,
+    curves: panel.curves.filter((curve) => curve.series in series),
+  })).filter((panel) => panel.curves.length > 0);
+  const unit = 1 / (panels.length + (panels.length - 1) * GAP);
+  const axes = panels.map((panel, index) => {
+    const top = 1 - index * unit * (1 + GAP);
+    const domain = [Math.max(top - unit, 0), top];
+    return [
+      axisName("yaxis", index),
+      axis({ domain, nticks: 4, automargin: false, ...panel.ticks?.(series[panel.curves[0].series]) }),
+    ];
+  });
+  return {
+    data: panels.flatMap((panel, index) => panel.curves.map((curve) => trace(series, panel, curve, index))),
+    layout: {
+      ...Object.fromEntries(axes),
+      ...Object.fromEntries(
+        panels.map((_, index) => [axisName("legend", index), legend(axes[index][1].domain[1])]),
+      ),
+      height: PANEL_HEIGHT * (panels.length * (1 + GAP)) + 30,
+      margin: MARGIN,
+      xaxis: axis({
+        title: { text: "time t", standoff: 8 },
+        anchor: axisName("y", panels.length - 1),
+        automargin: false,
+      }),
+      annotations: panels.map((panel, index) => heading(panel, axes[index][1].domain[1])),
+      hovermode: "x",
+    },
+  };
+}
+
+/**
+ * Plotly counts axes `y`, `y2`, `y3`.
+ *
+ * @param {string} name
+ * @param {number} index
+ */
+function axisName(name, index) {
+  return index === 0 ? name : `${name}${index + 1}`;
+}
+
+/**
+ * @param {Panel} panel
+ * @param {number} top
+ */
+function heading({ title }, top) {
+  return {
+    text: title,
+    xref: "paper",
+    yref: "paper",
+    x: 0,
+    y: top,
+    xanchor: "left",
+    yanchor: "bottom",
+    showarrow: false,
+  };
+}
+
+/**
+ * The names of a panel's curves, at the end of the line of its title.
+ *
+ * @param {number} top
+ */
+function legend(top) {
+  const font = { size: 11, color: color("muted") };
+  return { orientation: "h", x: 1.02, y: top, xanchor: "right", yanchor: "bottom", itemwidth: 30, font };
+}
+
+/**
+ * @param {Series} series
+ * @param {Panel} panel
+ * @param {Curve} curve
+ * @param {number} index
+ */
+function trace(series, panel, curve, index) {
+  const convert = panel.convert ?? ((/** @type {number} */ value) => value);
+  return {
+    type: "scatter",
+    mode: "lines",
+    name: curve.name,
+    x: series.time,
+    y: series[curve.series].map((value) => (value === null ? null : convert(value))),
+    yaxis: axisName("y", index),
+    legend: axisName("legend", index),
+    showlegend: panel.curves.length > 1,
+    line: { color: color(curve.color), width: 1.5 },
+    hovertemplate: "%{y:.4g}",
+  };
+}

@@ -1,0 +1,21 @@
+/** Starts the page: the routes, the colors, and nothing else. */
+
+import { startRouter } from "./router.js";
+import { startTheme } from "./theme.js";
+import { showBoundaries } from "./views/boundaries.js";
+import { showJob } from "./views/job.js";
+import { showJobs } from "./views/jobs.js";
+import { showRun } from "./views/run.js";
+import { showRuns } from "./views/runs.js";
+import { showSubmission } from "./views/submission.js";
+
+startTheme();
+startRouter([
+  { path: /^\/(?:boundaries)?$/, section: "boundaries", show: showBoundaries },
+  { path: /^\/boundaries\/(?<key>[0-9a-f]{16})$/, section: "boundaries", show: showBoundaries },
+  { path: /^\/runs$/, section: "runs", show: showRuns },
+  { path: /^\/runs\/(?<key>[0-9a-f]{32})$/, section: "runs", show: showRun },
+  { path: /^\/jobs$/, section: "jobs", show: showJobs },
+  { path: /^\/jobs\/(?<id>[0-9a-z-]+)$/, section: "jobs", show: showJob },
+  { path: /^\/new$/, section: "new", show: showSubmission },
+]);

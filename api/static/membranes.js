@@ -1,0 +1,243 @@
+/** Draws states on a canvas: membranes colored by tension, arrows of the flow, a color bar and a scale. */
+
+import { tensionColor, tensionRange } from "./colormap.js";
+import { velocityGradient } from "./flow.js";
+import { number } from "./format.js";
+import { color, isDark } from "./theme.js";
+
+/**
+ * @typedef {import("./frames.js").Frames} Frames
+ * @typedef {import("./frames.js").State} State
+ * @typedef {import("./frames.js").Membrane} Membrane
+ */
+
+const MEMBRANE_WIDTH = 4.5; // pixels, as all that follow
+const ARROWS_APART = 56;
+const LONGEST_ARROW = 34;
+const MARGIN = 28;
+const FOOT = 48; // below the drawing, for the color bar and the scale
+const BAR = { width: 180, height: 8 };
+
+/** A view that moves with the mean of the vesicles' centers, at one scale for the whole run. */
+export class MembraneCanvas {
+  /**
+   * @param {HTMLCanvasElement} canvas
+   * @param {any} scene
+   * @param {Frames} frames
+   */
+  constructor(canvas, scene, frames) {
+    this.canvas = canvas;
+    this.context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
+    this.gradient = velocityGradient(scene);
+    this.range = tensionRange(frames.states);
+    this.reach = reachOf(frames.states);
+    this.style = pageStyle();
+  }
+
+  /** Take over the page's colors as they are now. */
+  takeColors() {
+    this.style = pageStyle();
+  }
+
+  /** @param {State} state */
+  draw(state) {
+    const { context } = this;
+    const { width, height } = this.#fit();
+    const [halfWidth, halfHeight] = [width / 2 - MARGIN, (height - FOOT) / 2 - MARGIN];
+    const scale = Math.min(halfWidth / this.reach.x, halfHeight / this.reach.y);
+    const [x, y] = meanCenter(state);
+    const [left, top] = [width / 2, (height - FOOT) / 2];
+    context.clearRect(0, 0, width, height);
+    this.#drawFlow(width, height - FOOT);
+    for (const membrane of state.membranes) {
+      this.#drawMembrane(
+        membrane,
+        (value) => left + scale * (value - x),
+        (value) => top - scale * (value - y),
+      );
+    }
+    this.#drawColorBar(width, height);
+    this.#drawScale(height, scale);
+  }
+
+  /** Make the canvas as fine as the screen, and measure in its pixels. */
+  #fit() {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    const ratio = window.devicePixelRatio;
+    const [columns, rows] = [Math.round(width * ratio), Math.round(height * ratio)];
+    if (this.canvas.width !== columns || this.canvas.height !== rows) {
+      this.canvas.width = columns;
+      this.canvas.height = rows;
+    }
+    this.context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    return { width, height };
+  }
+
+  /**
+   * One short piece for each point, between the middles of its neighbors, bent at the point.
+   *
+   * @param {Membrane} membrane
+   * @param {(x: number) => number} across
+   * @param {(y: number) => number} down
+   */
+  #drawMembrane({ x, y, tension }, across, down) {
+    const { context } = this;
+    const [low, high] = this.range;
+    const count = x.length;
+    context.beginPath();
+    x.forEach((_, point) => context.lineTo(across(x[point]), down(y[point])));
+    context.fillStyle = this.style.surface; // the arrows are those of the fluid around
+    context.fill();
+    context.lineWidth = MEMBRANE_WIDTH;
+    context.lineCap = "round";
+    for (let point = 0; point < count; point += 1) {
+      const [before, after] = [(point + count - 1) % count, (point + 1) % count];
+      context.strokeStyle = tensionColor((tension[point] - low) / (high - low), this.style.isDark);
+      context.beginPath();
+      context.moveTo(across((x[before] + x[point]) / 2), down((y[before] + y[point]) / 2));
+      context.quadraticCurveTo(
+        across(x[point]),
+        down(y[point]),
+        across((x[point] + x[after]) / 2),
+        down((y[point] + y[after]) / 2),
+      );
+      context.stroke();
+    }
+  }
+
+  /**
+   * Arrows of the flow relative to the moving middle; the longest is where the flow is fastest in view.
+   *
+   * @param {number} width
+   * @param {number} height
+   */
+  #drawFlow(width, height) {
+    if (this.gradient === null) {
+      return;
+    }
+    const [[xx, xy], [yx, yy]] = this.gradient;
+    const [columns, rows] = [Math.floor(width / ARROWS_APART), Math.floor(height / ARROWS_APART)];
+    const corner = Math.hypot((xx * width + xy * height) / 2, (yx * width + yy * height) / 2);
+    this.context.strokeStyle = this.style.faint;
+    this.context.lineWidth = 1.2;
+    for (let row = 0; row < rows; row += 1) {
+      for (let column = 0; column < columns; column += 1) {
+        const x = (column - (columns - 1) / 2) * ARROWS_APART;
+        const y = ((rows - 1) / 2 - row) * ARROWS_APART;
+        const stretch = LONGEST_ARROW / corner;
+        const [dx, dy] = [stretch * (xx * x + xy * y), -stretch * (yx * x + yy * y)];
+        this.#drawArrow(width / 2 + x - dx / 2, height / 2 - y - dy / 2, dx, dy);
+      }
+    }
+  }
+
+  /**
+   * @param {number} x
+   * @param {number} y
+   * @param {number} dx
+   * @param {number} dy
+   */
+  #drawArrow(x, y, dx, dy) {
+    const { context } = this;
+    const length = Math.hypot(dx, dy);
+    if (length < 2) {
+      return;
+    }
+    const head = Math.min(4, length / 2) / length;
+    context.beginPath();
+    context.moveTo(x, y);
+    context.lineTo(x + dx, y + dy);
+    context.moveTo(x + dx - head * (dx - 0.7 * dy), y + dy - head * (dy + 0.7 * dx));
+    context.lineTo(x + dx, y + dy);
+    context.lineTo(x + dx - head * (dx + 0.7 * dy), y + dy - head * (dy - 0.7 * dx));
+    context.stroke();
+  }
+
+  /**
+   * @param {number} width
+   * @param {number} height
+   */
+  #drawColorBar(width, height) {
+    const { context } = this;
+    const barWidth = Math.min(BAR.width, width * 0.45);
+    const [left, top] = [width - MARGIN - barWidth, height - FOOT + 22];
+    const fill = context.createLinearGradient(left, 0, left + barWidth, 0);
+    for (let stop = 0; stop <= 16; stop += 1) {
+      fill.addColorStop(stop / 16, tensionColor(stop / 16, this.style.isDark));
+    }
+    context.fillStyle = fill;
+    context.fillRect(left, top, barWidth, BAR.height);
+    context.fillStyle = this.style.muted;
+    context.font = this.style.font;
+    context.textBaseline = "bottom";
+    context.textAlign = "left";
+    context.fillText(number(this.range[0], 2), left, top - 3);
+    context.textAlign = "right";
+    context.fillText(number(this.range[1], 2), left + barWidth, top - 3);
+    context.textAlign = "center";
+    context.fillText("tension σ", left + barWidth / 2, top - 3);
+  }
+
+  /**
+   * A line as long as the unit of length.
+   *
+   * @param {number} height
+   * @param {number} scale
+   */
+  #drawScale(height, scale) {
+    const { context } = this;
+    const y = height - FOOT + 26;
+    context.strokeStyle = this.style.muted;
+    context.lineWidth = 1.2;
+    context.beginPath();
+    context.moveTo(MARGIN, y);
+    context.lineTo(MARGIN + scale, y);
+    context.stroke();
+    context.textAlign = "left";
+    context.fillText("length 1", MARGIN, y - 6);
+  }
+}
+
+function pageStyle() {
+  return {
+    isDark: isDark(),
+    muted: color("muted"),
+    faint: color("faint"),
+    surface: color("surface"),
+    font: `12px ${window.getComputedStyle(document.body).fontFamily}`,
+  };
+}
+
+/**
+ * @param {State} state
+ * @returns {[number, number]}
+ */
+function meanCenter({ membranes }) {
+  const mean = (/** @type {"x" | "y"} */ axis) =>
+    membranes.reduce(
+      (sum, membrane) =>
+        sum + membrane[axis].reduce((total, value) => total + value, 0) / membrane[axis].length,
+      0,
+    ) / membranes.length;
+  return [mean("x"), mean("y")];
+}
+
+/**
+ * How far membranes reach from their mean center, over the whole run.
+ *
+ * @param {State[]} states
+ */
+function reachOf(states) {
+  const reach = { x: 0, y: 0 };
+  for (const state of states) {
+    const center = meanCenter(state);
+    for (const membrane of state.membranes) {
+      for (const [index, axis] of /** @type {const} */ (["x", "y"]).entries()) {
+        for (const value of membrane[axis]) {
+          reach[axis] = Math.max(reach[axis], Math.abs(value - center[index]));
+        }
+      }
+    }
+  }
+  return reach;
+}

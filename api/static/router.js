@@ -1,0 +1,99 @@
+/**
+ * Permanent links: what is shown is what stands behind the `#` of the address, a path and a query.
+ *
+ * A view gets a signal that is aborted when the page is left for another one.  Everything that a view keeps
+ * going (requests, timers, listeners, plots) ends by that signal.
+ */
+
+import { element } from "./dom.js";
+import { alertAbout } from "./problems.js";
+
+/**
+ * @typedef {object} Place
+ * @property {HTMLElement} content - What the view fills.
+ * @property {Record<string, string>} parameters - Named groups of the route's path.
+ * @property {URLSearchParams} query
+ * @property {AbortSignal} signal - Aborted when this place is left.
+ *
+ * @typedef {object} Route
+ * @property {RegExp} path
+ * @property {string} section - Which link of the navigation is current.
+ * @property {(place: Place) => Promise<void>} show
+ */
+
+/** Where the address points. */
+function location() {
+  const [path, query = ""] = (window.location.hash.slice(1) || "/").split("?", 2);
+  return { path, query: new URLSearchParams(query) };
+}
+
+/**
+ * Show the view that the address names, now and whenever the address changes.
+ *
+ * @param {Route[]} routes
+ */
+export function startRouter(routes) {
+  const content = /** @type {HTMLElement} */ (document.getElementById("content"));
+  let leaving = new AbortController();
+
+  async function show() {
+    leaving.abort();
+    leaving = new AbortController();
+    const { signal } = leaving;
+    const { path, query } = location();
+    const route = routes.find((candidate) => candidate.path.test(path));
+    markCurrent(route?.section);
+    document.title = "Vesicle ensemble";
+    content.replaceChildren();
+    if (!route) {
+      content.replaceChildren(element("h1", {}, "There is nothing here"), element("p", {}, path));
+      return;
+    }
+    try {
+      await route.show({ content, query, signal, parameters: { ...route.path.exec(path)?.groups } });
+    } catch (error) {
+      if (!signal.aborted) {
+        content.append(alertAbout(error));
+      }
+    }
+  }
+
+  window.addEventListener("hashchange", async () => {
+    await show();
+    content.focus({ preventScroll: true });
+    window.scrollTo(0, 0);
+  });
+  document.querySelector("[data-skip]")?.addEventListener("click", (event) => {
+    event.preventDefault(); // its hash would be taken for a place
+    content.focus();
+  });
+  void show();
+}
+
+/** @param {string | undefined} section */
+function markCurrent(section) {
+  for (const link of document.querySelectorAll("nav a")) {
+    if (link.getAttribute("href") === `#/${section}`) {
+      link.setAttribute("aria-current", "page");
+    } else {
+      link.removeAttribute("aria-current");
+    }
+  }
+}
+
+/**
+ * Put a value into the query of the address, without going anywhere.
+ *
+ * @param {string} name
+ * @param {string} value
+ */
+export function keepInAddress(name, value) {
+  const { path, query } = location();
+  query.set(name, value);
+  window.history.replaceState(null, "", `#${path}?${query}`);
+}
+
+/** @param {string} path - With its query. */
+export function goTo(path) {
+  window.location.hash = path;
+}

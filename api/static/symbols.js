@@ -1,0 +1,80 @@
+/** Names and symbols, as the field writes them, of a scene's parameters. */
+
+import { number } from "./format.js";
+
+/**
+ * @typedef {object} Quantity
+ * @property {string} name
+ * @property {string} symbol - Plain text.
+ */
+
+const SHEAR_RATE = { name: "shear rate", symbol: "γ̇" };
+const EXTENSION_RATE = { name: "extension rate", symbol: "ε̇" };
+
+/** @type {Record<string, Quantity>} */
+const BY_PATH = {
+  "adhesion.hamaker": { name: "Hamaker constant", symbol: "H" },
+  "adhesion.distance": { name: "separation distance", symbol: "δ" },
+  "vesicles.reduced_area": { name: "reduced area", symbol: "ΔA" },
+  "vesicles.length": { name: "vesicle length", symbol: "L" },
+  "vesicles.bending_modulus": { name: "bending modulus", symbol: "κ" },
+};
+
+/** @type {Record<string, string>} */
+const FLOWS = { shear: "shear flow", extension: "extensional flow", trap: "a fluid trap" };
+
+/**
+ * The quantity at a dotted path of a scene; a path without an established symbol stands for itself.
+ *
+ * @param {string} path
+ * @param {any} scene
+ * @returns {Quantity}
+ */
+export function quantity(path, scene) {
+  if (path === "flow.rate") {
+    return scene.flow?.kind === "shear" ? SHEAR_RATE : EXTENSION_RATE;
+  }
+  return BY_PATH[path] ?? { name: path, symbol: path };
+}
+
+/**
+ * One line on a scene: its vesicles, its flow, and its parameters as far as it has them.
+ *
+ * @param {any} scene
+ * @param {string[]} [without] - Dotted paths to leave out, for instance because they are the axes.
+ * @returns {string}
+ */
+export function describe(scene, without = []) {
+  const areas = new Set(scene.vesicles.map((/** @type {any} */ vesicle) => vesicle.reduced_area));
+  /** @type {[string, unknown[]][]} */
+  const values = [
+    ["flow.rate", scene.flow ? [scene.flow.rate] : []],
+    ["vesicles.reduced_area", [...areas].sort()],
+    ["adhesion.hamaker", scene.adhesion ? [scene.adhesion.hamaker] : []],
+    ["adhesion.distance", scene.adhesion ? [scene.adhesion.distance] : []],
+  ];
+  const shown = values
+    .filter(([path, numbers]) => numbers.length > 0 && !without.includes(path))
+    .map(
+      ([path, numbers]) =>
+        `${quantity(path, scene).symbol} = ${numbers.map((value) => number(/** @type {number} */ (value))).join(" and ")}`,
+    );
+  const count = scene.vesicles.length;
+  const vesicles = count === 1 ? "1 vesicle" : `${count} vesicles`;
+  const flow = scene.flow ? FLOWS[scene.flow.kind] : "quiescent fluid";
+  return [`${vesicles} in ${flow}`, ...shown].join(", ");
+}
+
+/**
+ * The number at a dotted path of a document; where the path leads through a list, that of its first element.
+ *
+ * @param {any} document
+ * @param {string} path
+ * @returns {any}
+ */
+export function valueAt(document, path) {
+  return path.split(".").reduce((value, name) => {
+    const inside = Array.isArray(value) && !/^\d+$/.test(name) ? value[0] : value;
+    return inside?.[name];
+  }, document);
+}

@@ -1,0 +1,99 @@
+/** One job: its progress as it goes, its log, and the diagram that it traces. */
+
+import { eventsOf, get, getText } from "../api.js";
+import { followBoundary } from "../boundary.js";
+import { definitions, element } from "../dom.js";
+import { dateAndTime, duration, words } from "../format.js";
+import { cancelButton, isUnfinished, progressOf, resultLink } from "../job.js";
+import { Problem, alertAbout, messageOf } from "../problems.js";
+
+/** @typedef {import("../job.js").Job} Job */
+
+/** @param {import("../router.js").Place} place */
+export async function showJob({ content, parameters, signal }) {
+  const address = `/jobs/${parameters.id}`;
+  const head = element("div", {});
+  const result = element("div", { class: "result" });
+  const log = element("details", { class: "log" }, element("summary", {}, "Log"));
+  const lines = log.appendChild(element("pre", { tabindex: 0 }));
+  content.replaceChildren(head, result, log);
+
+  const readLog = async () => {
+    try {
+      lines.textContent = (await getText(`${address}/log`, signal)) || "Nothing has been said yet.";
+    } catch (error) {
+      lines.textContent = messageOf(error);
+    }
+  };
+  log.addEventListener("toggle", () => log.open && void readLog());
+
+  /** @param {Job} job */
+  const show = (job) => {
+    document.title = `${words(job.name)} – Vesicle ensemble`;
+    head.replaceChildren(...heading(job));
+    if (log.open) {
+      void readLog();
+    }
+    showResult(result, job, signal);
+  };
+
+  /** @type {Job} */
+  const job = await get(address, signal);
+  show(job);
+  if (isUnfinished(job)) {
+    for await (const event of eventsOf(`${address}/events`, (latest) => !isUnfinished(latest), signal)) {
+      show(event);
+    }
+  }
+}
+
+/** @param {Job} job */
+function heading(job) {
+  const seconds =
+    job.started && job.finished ? (Date.parse(job.finished) - Date.parse(job.started)) / 1000 : null;
+  return [
+    element(
+      "div",
+      { class: "heading" },
+      element("h1", {}, words(job.name)),
+      cancelButton(job),
+      element("p", {}, job.kind === "study" ? "Job that traces a boundary" : "Job that simulates one scene"),
+    ),
+    element(
+      "div",
+      { class: "job-status", role: "status" },
+      element("span", { class: `state ${job.status}` }, job.status),
+      progressOf(job),
+    ),
+    job.message ? element("p", { class: job.status === "failed" ? "alert" : "note" }, job.message) : "",
+    definitions([
+      ["Submitted", dateAndTime(job.created)],
+      ["Took", seconds === null ? null : duration(seconds)],
+      ["Ranks", String(job.ranks)],
+      ["Result", resultLink(job)],
+    ]),
+  ];
+}
+
+/**
+ * Follow the diagram from the moment that the job has started.
+ *
+ * @param {HTMLElement} place
+ * @param {Job} job
+ * @param {AbortSignal} signal
+ */
+function showResult(place, job, signal) {
+  if (job.kind !== "study" || job.status === "accepted" || place.dataset.followed) {
+    return;
+  }
+  place.dataset.followed = "true";
+  followBoundary(place, job.key, signal).catch((error) => {
+    if (signal.aborted) {
+      return;
+    }
+    delete place.dataset.followed; // the first answer is not there yet; the next event tries again
+    if (!(error instanceof Problem && error.status === 404)) {
+      place.replaceChildren(alertAbout(error));
+    }
+  });
+}

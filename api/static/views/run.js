@@ -1,0 +1,136 @@
+/** One run: played, with its diagnostics, its results and its scene. */
+
+import { get } from "../api.js";
+import { Cursor } from "../cursor.js";
+import { definitions, element } from "../dom.js";
+import { dateAndTime, duration, number } from "../format.js";
+import { Frames } from "../frames.js";
+import { MARGIN, histories } from "../history.js";
+import { outcomeLabel } from "../outcomes.js";
+import { Player } from "../player.js";
+import { Plot } from "../plot.js";
+import { keepInAddress } from "../router.js";
+import { describe } from "../symbols.js";
+
+/** @param {import("../router.js").Place} place */
+export async function showRun({ content, parameters, query, signal }) {
+  const { key } = parameters;
+  const run = await get(`/runs/${key}`, signal);
+  document.title = `Run ${key.slice(0, 8)}: ${run.outcome} – Vesicle ensemble`;
+  const stage = element("div", { class: "stage" });
+  const plots = element("div", { class: "plot" });
+  content.replaceChildren(
+    heading(run),
+    element(
+      "div",
+      { class: "columns run" },
+      stage,
+      element("div", { class: "histories" }, plots),
+      results(run),
+    ),
+    sceneOf(run),
+  );
+
+  const [frames, { series }] = await Promise.all([
+    Frames.of(run, signal),
+    get(`/runs/${key}/series`, signal),
+  ]);
+  const plot = new Plot(plots, signal);
+  const drawn = plot.draw(() => histories(series));
+  if (frames.states.length === 0) {
+    stage.append(element("p", { class: "alert" }, "This run has no state that could be drawn."));
+    return drawn;
+  }
+  const player = new Player(run.scene, frames, signal);
+  stage.append(player.element);
+  player.canvas.setAttribute("aria-label", `${describe(run.scene)}: membranes colored by tension`);
+  keepTime(player, query);
+  await link(player, plot, drawn);
+}
+
+/**
+ * The line in the plots follows the player, and a click in the plots moves the player there.
+ *
+ * @param {Player} player
+ * @param {Plot} plot
+ * @param {Promise<void>} drawn - When the plots are.
+ */
+async function link(player, plot, drawn) {
+  const cursor = new Cursor(plot.place, MARGIN);
+  plot.place.after(cursor.line);
+  plot.on("plotly_click", ({ points: [point] }) => player.rest(point.x));
+  plot.on("plotly_afterplot", () => cursor.show(player.time)); // zoomed, resized, or in other colors
+  await drawn;
+  player.onTime((time) => cursor.show(time));
+}
+
+/**
+ * The address names the time at which the player was stopped.
+ *
+ * @param {Player} player
+ * @param {URLSearchParams} query
+ */
+function keepTime(player, query) {
+  if (query.has("time")) {
+    player.seek(Number(query.get("time")) || 0);
+  }
+  player.onRest((time) => keepInAddress("time", time.toFixed(2)));
+}
+
+/** @param {any} run */
+function heading({ key, outcome, time, scene, failure }) {
+  return element(
+    "div",
+    { class: "heading" },
+    element("h1", {}, outcomeLabel(outcome)),
+    element("a", { class: "button", href: `#/new?run=${key}` }, "Run again with changes"),
+    element("p", {}, `${describe(scene)}; decided at t = ${number(time)}`),
+    failure ? element("p", { class: "alert" }, failure) : null,
+  );
+}
+
+/** @param {any} run */
+function results({ period, gap, inclination_angle, viscosity, energy, error, work }) {
+  const known = (/** @type {any} */ value) => (value === null || value === undefined ? null : number(value));
+  return element(
+    "section",
+    { class: "results" },
+    element("h2", {}, "Results"),
+    definitions([
+      ["Period", known(period)],
+      ["Gap", known(gap)],
+      ["Inclination", inclination_angle === null ? null : `${number(inclination_angle)}°`],
+      ["Viscosity [μ]", known(viscosity?.total)],
+      ["– bending + tension", known(viscosity?.bending_tension)],
+      ["– adhesion", known(viscosity?.adhesion)],
+      ["Bending energy", known(energy.bending)],
+      ["Adhesion energy", known(energy.adhesion)],
+      ["Area error", number(error.area, 2)],
+      ["Closure error", number(error.closure, 2)],
+      ["Temporal error", number(error.temporal, 2)],
+      ["Spatial error", number(error.spatial, 2)],
+      ["Steps", `${work.steps} (${work.rejected_steps} rejected)`],
+      ["Computed in", duration(work.wall_seconds)],
+    ]),
+  );
+}
+
+/** @param {any} run */
+function sceneOf({ key, created, versions, scene }) {
+  return element(
+    "details",
+    { class: "scene" },
+    element("summary", {}, "Scene and provenance"),
+    definitions([
+      ["Key", element("code", {}, key)],
+      ["Made", dateAndTime(created)],
+      [
+        "With",
+        Object.entries(versions)
+          .map(([name, version]) => `${name} ${version}`)
+          .join(", "),
+      ],
+    ]),
+    element("pre", { tabindex: 0 }, JSON.stringify(scene, null, 2)),
+  );
+}

@@ -1,0 +1,104 @@
+/** The runs of the store, filtered by conditions on their scenes and results. */
+
+import { get } from "../api.js";
+import { element, tableRow } from "../dom.js";
+import { dateAndTime, number } from "../format.js";
+import { MARKS, outcomeLabel } from "../outcomes.js";
+import { alertAbout } from "../problems.js";
+import { goTo } from "../router.js";
+import { describe } from "../symbols.js";
+
+const COLUMNS = ["Outcome", "Scene", "Time", "Made", ""];
+
+/** @param {import("../router.js").Place} place */
+export async function showRuns({ content, query, signal }) {
+  document.title = "Runs – Vesicle ensemble";
+  const rows = element("tbody", {});
+  const count = element("p", { class: "note", role: "status" });
+  const more = element("button", { hidden: true }, "Older runs");
+  content.replaceChildren(
+    element("div", { class: "heading" }, element("h1", {}, "Runs")),
+    filters(query),
+    element(
+      "table",
+      { class: "stacked" },
+      element("caption", { class: "hidden" }, "Runs, the latest first"),
+      element(
+        "thead",
+        {},
+        element("tr", {}, ...COLUMNS.map((name) => element("th", { scope: "col" }, name))),
+      ),
+      rows,
+    ),
+    count,
+    more,
+  );
+
+  const where = query.getAll("where").map((condition) => ["where", condition]);
+  let next = `/runs?${new URLSearchParams([...where, ["limit", "50"]])}`;
+  const load = async () => {
+    const page = await get(next, signal);
+    rows.append(...page.items.map(row));
+    next = page.next;
+    more.hidden = next === null;
+    count.textContent = rows.rows.length === 0 ? "No run meets these conditions." : "";
+  };
+  more.addEventListener("click", () => load().catch((error) => more.replaceWith(alertAbout(error))));
+  await load();
+}
+
+/** @param {any} run */
+function row({ key, outcome, scene, time, created }) {
+  return tableRow(COLUMNS, [
+    outcomeLabel(outcome),
+    describe(scene),
+    number(time),
+    dateAndTime(created),
+    element("a", { href: `#/runs/${key}` }, "Play"),
+  ]);
+}
+
+/**
+ * Conditions are part of the address, so a selection can be linked to.
+ *
+ * @param {URLSearchParams} query
+ */
+function filters(query) {
+  const given = query.getAll("where");
+  const chosen = given.find((condition) => condition.startsWith("outcome="))?.slice("outcome=".length);
+  const outcome = element(
+    "select",
+    { id: "outcome" },
+    element("option", { value: "" }, "any"),
+    ...Object.keys(MARKS).map((name) => element("option", { selected: name === chosen }, name)),
+  );
+  const conditions = element("input", {
+    id: "conditions",
+    value: given.filter((condition) => !condition.startsWith("outcome=")).join(", "),
+    placeholder: "flow.rate>=0.5, adhesion.hamaker<1",
+    autocapitalize: "off",
+    spellcheck: "false",
+  });
+
+  /** @param {SubmitEvent} event */
+  const apply = (event) => {
+    event.preventDefault();
+    const wanted = conditions.value
+      .split(",")
+      .map((condition) => condition.trim())
+      .filter(Boolean);
+    if (outcome.value) {
+      wanted.push(`outcome=${outcome.value}`);
+    }
+    goTo(`/runs?${new URLSearchParams(wanted.map((condition) => ["where", condition]))}`);
+  };
+  return element(
+    "form",
+    { class: "inline", onsubmit: apply },
+    element("label", { for: "outcome" }, "Outcome"),
+    outcome,
+    element("label", { for: "conditions" }, "Conditions"),
+    conditions,
+    element("button", {}, "Filter"),
+  );
+}

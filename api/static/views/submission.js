@@ -1,0 +1,221 @@
+/** A form that submits a preset, or the scene of a run, with changed parameters. */
+
+import { get, getAll, post } from "../api.js";
+import { element } from "../dom.js";
+import { fieldsOf } from "../fields.js";
+import { number, words } from "../format.js";
+import { FieldInput } from "../inputs.js";
+import { alertAbout, messageOf } from "../problems.js";
+import { goTo } from "../router.js";
+
+/**
+ * @typedef {object} Template - What is submitted apart from the changes.
+ * @property {string} title
+ * @property {any} document
+ * @property {{preset: string} | {scene: any}} origin
+ */
+
+const USUAL_PRESET = "critical-hamaker";
+const QUIET_MILLISECONDS = 250; // without a key pressed, before the cost is asked for
+
+/** @param {import("../router.js").Place} place */
+export async function showSubmission({ content, query, signal }) {
+  document.title = "New job – Vesicle ensemble";
+  const presets = await getAll("/presets", signal);
+  const template = await templateOf(query, presets, signal);
+  content.replaceChildren(
+    element("div", { class: "heading" }, element("h1", {}, "New job")),
+    element(
+      "div",
+      { class: "columns submission" },
+      new SubmissionForm(template, signal).element,
+      choices(presets, "preset" in template.origin ? template.origin.preset : null),
+    ),
+  );
+}
+
+/**
+ * @param {URLSearchParams} query
+ * @param {any[]} presets
+ * @param {AbortSignal} signal
+ * @returns {Promise<Template>}
+ */
+async function templateOf(query, presets, signal) {
+  const run = query.get("run");
+  if (run) {
+    const { scene } = await get(`/runs/${run}`, signal);
+    return { title: `Scene of run ${run.slice(0, 8)}`, document: scene, origin: { scene } };
+  }
+  const wanted = query.get("preset") ?? USUAL_PRESET;
+  const preset = presets.find(({ name }) => name === wanted) ?? presets[0];
+  return { title: words(preset.name), document: preset.document, origin: { preset: preset.name } };
+}
+
+/**
+ * @param {any[]} presets
+ * @param {string | null} current
+ */
+function choices(presets, current) {
+  const links = presets.map(({ name, kind, estimate }) =>
+    element(
+      "li",
+      {},
+      element(
+        "a",
+        { href: `#/new?preset=${name}`, "aria-current": name === current ? "true" : null },
+        element("strong", {}, words(name)),
+        element("span", {}, kind === "study" ? `study, up to ${estimate.runs} runs` : "one run"),
+      ),
+    ),
+  );
+  return element(
+    "nav",
+    { class: "shelf", "aria-label": "Presets" },
+    element("h2", {}, "Presets"),
+    element("ul", {}, ...links),
+  );
+}
+
+class SubmissionForm {
+  /** The same for every attempt of this form, so that a repeated request makes one job. */
+  #idempotencyKey = crypto.randomUUID();
+  /** @type {number | undefined} */
+  #timer;
+
+  /**
+   * @param {Template} template
+   * @param {AbortSignal} signal
+   */
+  constructor(template, signal) {
+    this.template = template;
+    this.signal = signal;
+    this.inputs = fieldsOf(template.document).map((field) => new FieldInput(field));
+    this.ranks = element("input", {
+      id: "ranks",
+      type: "number",
+      min: 1,
+      placeholder: "as the service sees fit",
+    });
+    this.seconds = element("input", {
+      id: "seconds",
+      type: "number",
+      min: 1,
+      placeholder: "as the service sees fit",
+    });
+    this.cost = element("p", { class: "cost", role: "status" });
+    this.submit = element("button", { class: "primary" }, "Submit");
+    const [principal, others] = [true, false].map((wanted) =>
+      this.inputs.filter((input) => input.field.isPrincipal === wanted).map((input) => input.element),
+    );
+    this.element = element(
+      "form",
+      {
+        class: "submit",
+        novalidate: true,
+        onsubmit: (/** @type {Event} */ event) => this.#send(event),
+        oninput: () => this.#onInput(),
+      },
+      element("h2", {}, template.title),
+      element("div", { class: "fields" }, ...principal),
+      element(
+        "details",
+        {},
+        element("summary", {}, `${others.length} more parameters`),
+        element("div", { class: "fields" }, ...others),
+      ),
+      element(
+        "div",
+        { class: "fields" },
+        element(
+          "div",
+          { class: "field" },
+          element("label", { for: "ranks" }, "ranks (processes)"),
+          this.ranks,
+        ),
+        element(
+          "div",
+          { class: "field" },
+          element("label", { for: "seconds" }, "time limit in seconds"),
+          this.seconds,
+        ),
+      ),
+      element("div", { class: "commit" }, this.cost, this.submit),
+    );
+    signal.addEventListener("abort", () => window.clearTimeout(this.#timer));
+    void this.#estimate();
+  }
+
+  /** The document that is sent. */
+  get submission() {
+    const changed = this.inputs
+      .filter((input) => input.isChanged)
+      .map((input) => [input.field.path, input.value]);
+    const limits = [this.ranks, this.seconds]
+      .filter((input) => input.value)
+      .map((input) => [input.id, Number(input.value)]);
+    return { ...this.template.origin, ...Object.fromEntries(limits), set: Object.fromEntries(changed) };
+  }
+
+  #onInput() {
+    this.#idempotencyKey = crypto.randomUUID();
+    window.clearTimeout(this.#timer);
+    this.#timer = window.setTimeout(() => this.#estimate(), QUIET_MILLISECONDS);
+  }
+
+  async #estimate() {
+    const asked = JSON.stringify(this.submission);
+    try {
+      const estimate = await post("/estimate", this.submission, { signal: this.signal });
+      if (asked === JSON.stringify(this.submission)) {
+        this.#showCost(estimate);
+      }
+    } catch (error) {
+      if (!this.signal.aborted && asked === JSON.stringify(this.submission)) {
+        this.#refuse(error);
+      }
+    }
+  }
+
+  /** @param {{runs: number, cost: number, maximum: number, accepted: boolean}} estimate */
+  #showCost({ runs, cost, maximum, accepted }) {
+    const count = runs === 1 ? "One run" : `At most ${runs} runs`;
+    const share = `cost ${number(cost, 2)} of ${number(maximum, 2)} allowed (points × vesicles × time)`;
+    this.cost.textContent = accepted ? `${count}, ${share}.` : `Too large: ${share}.`;
+    this.submit.disabled = !accepted;
+    this.#mark("");
+  }
+
+  /** @param {unknown} error */
+  #refuse(error) {
+    this.cost.replaceChildren(alertAbout(error));
+    this.submit.disabled = true;
+    this.#mark(messageOf(error));
+  }
+
+  /**
+   * Mark the inputs whose paths a message names; a field of one vesicle is one of the field of all.
+   *
+   * @param {string} message
+   */
+  #mark(message) {
+    const general = message.replaceAll(/\.\d+(?=\.)/g, "");
+    for (const input of this.inputs) {
+      const { path } = input.field;
+      input.mark([message, general].some((text) => text.split(/[\s:;]+/).includes(path)));
+    }
+  }
+
+  /** @param {Event} event */
+  async #send(event) {
+    event.preventDefault();
+    this.submit.disabled = true;
+    try {
+      const headers = { "Idempotency-Key": this.#idempotencyKey };
+      const job = await post("/jobs", this.submission, { headers });
+      goTo(`/jobs/${job.id}`);
+    } catch (error) {
+      this.#refuse(error);
+      this.submit.disabled = false;
+    }
+  }
+}

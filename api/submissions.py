@@ -1,0 +1,76 @@
+"""From what somebody submits to the work that a job carries out."""
+
+from __future__ import annotations
+
+from http import HTTPStatus
+from typing import Annotated, Any
+
+from fastapi import Depends, Request
+from fastapi.concurrency import run_in_threadpool
+from pydantic import ValidationError
+from pydantic_core import from_json
+
+from api.job import Kind, Work, preset_work, scene_work, study_work
+from api.problems import Problem, invalid
+from api.schemas import Submission
+from api.size import limit_scene, limit_study
+from ensemble.errors import BadInput
+from ensemble.overrides import override
+from ensemble.study import preset_document
+
+
+async def read_submission(request: Request) -> Submission:
+    """Read the body of a request, strictly: a word is no number, and neither is true or false."""
+    kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+    if kind != "application/json":
+        raise Problem(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, f"Content-Type: {kind!r} — must be application/json")
+    # Not in the event loop: vesicles are compared pair by pair.
+    return await run_in_threadpool(_parse, await request.body())
+
+
+def _parse(body: bytes) -> Submission:
+    try:
+        document = from_json(body)
+        if isinstance(document, dict):
+            limit_study(document.get("study"))
+            limit_scene(document.get("scene"))
+        return Submission.model_validate_json(body, strict=True)
+    except ValidationError as error:
+        raise invalid(error.errors(include_url=False)) from error
+    except ValueError as error:
+        raise BadInput(f"body: {error}") from error
+
+
+Submitted = Annotated[Submission, Depends(read_submission)]
+
+
+def requested(submission: Submission) -> Work:
+    """Return the work that a submission asks for, with its changes made.
+
+    Raises
+    ------
+    BadInput
+        If there is no such preset, or it is no study or scene after the changes; names the field.
+    """
+    try:
+        if submission.preset is not None:
+            document = override(preset_document(submission.preset), submission.set)
+            _limit(kind_of(document), document)
+            return preset_work(submission.preset, submission.set)
+        if submission.study is not None:
+            _limit(Kind.STUDY, override(submission.study.model_dump(mode="json"), submission.set))
+            return study_work(submission.study, submission.set)
+        assert submission.scene is not None, "a submission has one of the three"
+        _limit(Kind.SCENE, override(submission.scene.model_dump(mode="json"), submission.set))
+        return scene_work(submission.scene, submission.set)
+    except ValueError as error:
+        raise BadInput(str(error)) from error
+
+
+def kind_of(document: dict[str, Any]) -> Kind:
+    """Tell a document of a study, which has a search, from that of a scene."""
+    return Kind.STUDY if "search" in document else Kind.SCENE
+
+
+def _limit(kind: Kind, document: dict[str, Any]) -> None:
+    (limit_study if kind is Kind.STUDY else limit_scene)(document)

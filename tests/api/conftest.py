@@ -1,0 +1,77 @@
+"""Databases, queues and services to test with."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx
+import pytest
+
+from api.database import Database
+from api.jobs import Jobs
+from api.settings import Settings
+from ensemble.store import Store
+from tests.api import postgresql
+from tests.api.servers import client_of
+from tests.api.stores import fill
+
+
+@pytest.fixture(scope="session")
+def postgresql_server() -> Iterator[postgresql.Server]:
+    """A PostgreSQL server."""
+    programs = postgresql.programs()
+    if programs is None:
+        pytest.skip("no PostgreSQL server: install the system's package")
+    with postgresql.running(programs) as server:
+        yield server
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Path:
+    """An empty store."""
+    path = tmp_path / "store"
+    Store.open(path).close()
+    return path
+
+
+@pytest.fixture(params=["sqlite", "postgresql"])
+def database_url(request: pytest.FixtureRequest, store: Path) -> str:
+    """URL of an empty database, of every kind that there is."""
+    if request.param == "sqlite":
+        return Settings(store=store).database_url
+    server: postgresql.Server = request.getfixturevalue("postgresql_server")
+    return server.new_database()
+
+
+@pytest.fixture
+def database(database_url: str, store: Path) -> Iterator[Database]:
+    """A database with its tables."""
+    with Database.open(database_url, store) as opened:
+        yield opened
+
+
+@pytest.fixture
+def jobs(database: Database, store: Path) -> Jobs:
+    """An empty queue."""
+    return Jobs(database, store)
+
+
+@pytest.fixture(scope="session")
+def filled_store(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A store of runs and a boundary; tests only read it."""
+    return fill(tmp_path_factory.mktemp("filled") / "store")
+
+
+@pytest.fixture(scope="session")
+def reading(filled_store: Path) -> Iterator[httpx.Client]:
+    """Talks to a service of the filled store; tests only read."""
+    with client_of(filled_store) as client:
+        yield client
+
+
+@pytest.fixture
+def submitting(store: Path) -> Iterator[httpx.Client]:
+    """Talks to a service of an empty store, whose jobs nobody carries out."""
+    with client_of(store) as client:
+        yield client

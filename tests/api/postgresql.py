@@ -1,0 +1,86 @@
+"""A PostgreSQL server of the tests' own, from the system's package."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from uuid import uuid4
+
+from sqlalchemy import URL
+
+ROOT = 0
+SECONDS_TO_START = 20
+
+
+@dataclass(frozen=True)
+class Server:
+    """A running server, reached by a socket in its directory.  It refuses to run as root."""
+
+    programs: Path
+    directory: Path
+    user: str | None
+
+    def run(self, program: str, *arguments: str) -> None:
+        subprocess.run(
+            [self.programs / program, *arguments],
+            user=self.user,
+            cwd=self.directory,
+            check=True,
+            capture_output=True,
+        )
+
+    def new_database(self) -> str:
+        """Make an empty database and return its URL."""
+        name = f"test_{uuid4().hex}"
+        self.run("createdb", "--host", str(self.directory), "--username=tests", name)
+        query = {"host": str(self.directory)}
+        return URL.create("postgresql+psycopg", "tests", database=name, query=query).render_as_string()
+
+
+def programs() -> Path | None:
+    """Directory of the server's programs, which Debian keeps off the PATH."""
+    found = sorted(Path("/usr/lib/postgresql").glob("*/bin/initdb")) or [shutil.which("initdb")]
+    return Path(found[-1]).parent if found[-1] else None
+
+
+@contextmanager
+def running(programs: Path) -> Iterator[Server]:
+    """Run a server."""
+    user = "postgres" if os.geteuid() == ROOT else None
+    # Not in pytest's directory, which only its owner may enter.
+    directory = Path(tempfile.mkdtemp(prefix="postgresql-"))
+    try:
+        if user is not None:
+            shutil.chown(directory, user)
+        server = Server(programs, directory, user)
+        data = str(directory / "data")
+        server.run("initdb", "--pgdata", data, "--username=tests", "--auth=trust")
+        process = subprocess.Popen(
+            [programs / "postgres", "-D", data, "-k", directory, "-c", "listen_addresses="],
+            user=user,
+            cwd=directory,
+            stderr=subprocess.DEVNULL,
+        )
+        try:
+            _wait_until_ready(server, process)
+            yield server
+        finally:
+            process.terminate()
+            process.wait()
+    finally:
+        shutil.rmtree(directory)
+
+
+def _wait_until_ready(server: Server, process: subprocess.Popen[bytes]) -> None:
+    deadline = time.monotonic() + SECONDS_TO_START
+    while subprocess.run([server.programs / "pg_isready", "-q", "-h", server.directory]).returncode != 0:
+        assert process.poll() is None, "the server ended"
+        assert time.monotonic() < deadline, "the server did not start"
+        time.sleep(0.05)

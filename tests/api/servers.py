@@ -1,0 +1,65 @@
+"""Services to send requests to: the application under its real server, in a thread of the test's process."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import timedelta
+from pathlib import Path
+from typing import Any
+
+import httpx
+import uvicorn
+
+from api.app import create_app
+from api.database import Database
+from api.scope import Scope
+from api.serve import configuration, opened
+from api.settings import Settings
+from api.tokens import Tokens
+
+SECONDS_TO_START = 20
+
+
+def make_token(store: Path, user: str, scope: Scope, lifetime: timedelta = timedelta(hours=1)) -> str:
+    """Make a token in the database of a store."""
+    with Database.open(Settings(store=store).database_url, store) as database:
+        return Tokens(database).create(user, scope, lifetime)
+
+
+@contextmanager
+def serving(store: Path, **limits: Any) -> Iterator[str]:
+    """Serve a store, without workers; gives the address."""
+    settings = Settings(store=store, **limits)
+    with opened(settings) as service:
+        server = uvicorn.Server(configuration(create_app(service), settings, "127.0.0.1", 0))
+        thread = threading.Thread(target=server.run)
+        thread.start()
+        try:
+            yield f"http://127.0.0.1:{_port(server, thread)}"
+        finally:
+            server.should_exit = True
+            thread.join()
+
+
+def _port(server: uvicorn.Server, thread: threading.Thread) -> int:
+    deadline = time.monotonic() + SECONDS_TO_START
+    while not server.started:
+        assert thread.is_alive()
+        assert time.monotonic() < deadline, "the server did not start"
+        time.sleep(0.01)
+    (socket,) = server.servers[0].sockets
+    return int(socket.getsockname()[1])
+
+
+@contextmanager
+def client_of(store: Path, token: str | None = None, **limits: Any) -> Iterator[httpx.Client]:
+    """Serve a store and give a client that talks to it."""
+    headers = {} if token is None else {"Authorization": f"Bearer {token}"}
+    with (
+        serving(store, **limits) as address,
+        httpx.Client(base_url=address, headers=headers, timeout=30) as client,
+    ):
+        yield client

@@ -1,0 +1,81 @@
+"""The service answers as its description says, whatever is sent.
+
+`tests/benchmarks/openapi_cases.py` sends many times as much.
+"""
+
+from __future__ import annotations
+
+import httpx
+import pytest
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
+
+from ensemble.store.catalog import BOUNDARY_FIELDS, RUN_FIELDS
+from tests.api.described import try_everything
+
+# Not this one, and no other, may be an answer: the server made a mistake.
+ACCIDENT = 500
+
+
+def test_made_up_requests_get_the_documented_answers(tmp_path):
+    verdict = try_everything(tmp_path, "--phases=fuzzing", "--max-examples=30", "--seed=1", seconds=120)
+    assert verdict.passed, verdict.text
+    assert verdict.cases > 300, verdict.text
+
+
+@pytest.fixture(scope="module")
+def paths(reading: httpx.Client) -> dict:
+    return reading.get("/openapi.json").json()["paths"]
+
+
+def test_every_route_is_described(paths):
+    assert {(method, path) for path, methods in paths.items() for method in methods} == {
+        ("post", "/estimate"),
+        ("post", "/jobs"),
+        ("get", "/jobs"),
+        ("get", "/jobs/{identifier}"),
+        ("delete", "/jobs/{identifier}"),
+        ("get", "/jobs/{identifier}/events"),
+        ("get", "/jobs/{identifier}/log"),
+        ("get", "/runs"),
+        ("get", "/runs/{key}"),
+        ("get", "/runs/{key}/series"),
+        ("get", "/runs/{key}/frames"),
+        ("get", "/boundaries"),
+        ("get", "/boundaries/{key}"),
+        ("get", "/boundaries/{key}/at"),
+        ("get", "/presets"),
+        ("get", "/metrics"),
+        ("get", "/healthz"),
+        ("get", "/readyz"),
+    }
+
+
+def test_every_error_is_described_as_a_problem(paths):
+    for path, methods in paths.items():
+        for method, operation in methods.items():
+            for status, response in operation["responses"].items():
+                if int(status) >= 400:
+                    assert list(response["content"]) == ["application/problem+json"], (path, method, status)
+
+
+segments = st.sampled_from(sorted({*RUN_FIELDS, *BOUNDARY_FIELDS, "flow", "rate", "0", "kind", "study", "x"}))
+conditions = st.builds(
+    "{}{}{}".format,
+    st.lists(segments | st.integers(0).map(str), min_size=1, max_size=5).map(".".join),
+    st.sampled_from(["=", "!=", "<", "<=", ">", ">="]),
+    st.text(min_size=1) | st.integers().map(str) | st.floats().map(str) | st.sampled_from(["null", "true"]),
+)
+
+
+@settings(deadline=None, max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(where=st.lists(conditions | st.text(), max_size=3), kind=st.sampled_from(["runs", "boundaries"]))
+@example(where=["work.steps=" + "9" * 40], kind="runs")
+@example(where=["vesicles." + "9" * 40 + ".angle=1"], kind="runs")
+@example(where=["time=1e999"], kind="runs")
+@example(where=["name=' OR 1=1 --"], kind="boundaries")
+@example(where=["failure=\x00"], kind="runs")
+@example(where=["failure=\ud800".encode("utf-8", "surrogatepass").decode("latin-1")], kind="runs")
+def test_no_filter_is_an_accident(reading, where, kind):
+    response = reading.get(f"/{kind}", params={"where": where})
+    assert response.status_code in (200, 422), response.text

@@ -1,0 +1,345 @@
+"""The page, in a real browser, before a real service with a worker."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+from playwright.sync_api import Browser, ConsoleMessage, Page, expect, sync_playwright
+
+from api.scope import Scope
+from ensemble.boundary import Boundary
+from ensemble.keys import run_key
+from ensemble.store import Store
+from ensemble.study import load_study
+from solver.run import Outcome, Run
+from tests.api.processes import wait_until
+from tests.api.servers import make_token, serving
+from tests.api.services import service, start_service
+
+WIDE, NARROW = {"width": 1400, "height": 900}, {"width": 390, "height": 844}
+EARLIER = datetime(2026, 1, 1, tzinfo=UTC)
+VIEWS = {
+    "/": "Critical Hamaker constant against shear rate",
+    "/#/runs": "Runs",
+    "/#/jobs": "Jobs",
+    "/#/new?preset=doublet-shear": "New job",
+}
+# The plotting library brings a style sheet for maps, of which there are none here.
+EXPECTED_MESSAGE = "Applying inline style violates the following Content Security Policy directive"
+QUICK_STUDY = {
+    "values of the shear rate": "0.5",
+    "relative width of a bracket": "0.025",
+    "points on each vesicle": "36",
+    "tolerance in time": "1e-3",
+}
+
+
+@pytest.fixture(scope="module")
+def store(finished_study: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A traced boundary and its runs."""
+    return Path(shutil.copytree(finished_study.store, tmp_path_factory.mktemp("page") / "store"))
+
+
+@pytest.fixture(scope="module")
+def run(store: Path) -> Run:
+    """A run in which the doublet stays together."""
+    with Store.existing(store) as opened:
+        return opened.load(opened.summaries(["outcome=bound"])[0].key)
+
+
+@pytest.fixture(scope="module")
+def url(store: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """Address of a service with a worker."""
+    with service(store, tmp_path_factory.mktemp("page") / "log") as started:
+        yield started.url
+
+
+@pytest.fixture(scope="module")
+def boundary(finished_study: Any) -> str:
+    """Address of the boundary, from that of the service."""
+    with Store.existing(finished_study.store) as opened:
+        return f"/#/boundaries/{opened.boundaries()[0].study_key}"
+
+
+@pytest.fixture(scope="module")
+def run_path(run: Run) -> str:
+    return f"/#/runs/{run_key(run.scene)}"
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with sync_playwright() as playwright:
+        # Without one on the system, the one that playwright has installed.
+        chromium = playwright.chromium.launch(executable_path=shutil.which("chromium"))
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture
+def page(browser: Browser) -> Iterator[Page]:
+    """A wide page, in which no script may fail."""
+    with browser.new_context(viewport=WIDE) as context:
+        opened = context.new_page()
+        failures: list[str] = []
+        opened.on("pageerror", lambda error: failures.append(str(error)))
+        yield opened
+        assert not failures
+
+
+def count(page: Page, outcome: str) -> int:
+    """How many marks the diagram has for an outcome."""
+    traces = page.locator(".diagram").evaluate("plot => plot.data")
+    return sum(len(trace["x"]) for trace in traces if trace.get("name") == outcome)
+
+
+def widths(page: Page) -> list[float]:
+    """Widths of the brackets that are drawn."""
+    traces = page.locator(".diagram").evaluate("plot => plot.data")
+    return [2 * half for trace in traces for half in trace.get("error_y", {}).get("array", [])]
+
+
+def picture(page: Page) -> str:
+    """What the player's canvas shows."""
+    return str(page.locator(".player canvas").evaluate("canvas => canvas.toDataURL()"))
+
+
+def clock(page: Page) -> float:
+    return float(page.locator(".player .clock").inner_text().removeprefix("t = "))
+
+
+def across(page: Page) -> float:
+    """Where the line in the plots stands."""
+    box = page.locator(".cursor").bounding_box()
+    assert box is not None
+    return box["x"]
+
+
+def test_a_study_is_submitted_and_its_brackets_close_before_ones_eyes(page: Page, url: str) -> None:
+    page.goto(f"{url}/#/new?preset=critical-hamaker")
+    expect(page.get_by_text("At most 66 runs")).to_be_visible()
+    page.get_by_label("points on each vesicle").fill("31")
+    expect(page.get_by_role("alert")).to_contain_text("scene.numerics.points: 31")
+    expect(page.get_by_label("points on each vesicle")).to_have_attribute("aria-invalid", "true")
+    expect(page.get_by_role("button", name="Submit")).to_be_disabled()
+    for label, value in QUICK_STUDY.items():
+        page.get_by_label(label).fill(value)
+    expect(page.get_by_text(re.compile("^At most 1[0-9] runs"))).to_be_visible()
+
+    page.evaluate("window.isSamePage = true")
+    page.get_by_role("button", name="Submit").click()
+    page.wait_for_url("**/#/jobs/*")
+    drawn: list[list[float]] = []
+    page.locator(".diagram .main-svg").first.wait_for(timeout=60_000)
+    succeeded = page.locator(".job-status", has_text="succeeded")
+    while not succeeded.is_visible():
+        drawn.append(widths(page))
+        page.wait_for_timeout(50)
+    expect(page.get_by_text("complete", exact=True)).to_be_visible()
+    assert page.evaluate("window.isSamePage")
+    last = widths(page)
+    assert len(last) == 1
+    assert max(max(each) for each in drawn if each) > 1.5 * max(last)
+    # What the page has drawn is what the service says.
+    job = httpx.get(f"{url}/jobs").json()["items"][0]
+    points = httpx.get(f"{url}/boundaries/{job['key']}").json()["points"]
+    assert sorted(last) == pytest.approx(
+        sorted(point["bracket"][1] - point["bracket"][0] for point in points)
+    )
+    assert count(page, "bound") + count(page, "separated") == len(
+        {run for point in points for run in point["runs"]}
+    )
+
+
+def test_a_mark_in_the_diagram_leads_to_its_run(page: Page, url: str, boundary: str) -> None:
+    page.goto(url + boundary)
+    page.locator(".diagram .scatterlayer .point").first.hover(force=True)
+    page.mouse.down()
+    page.mouse.up()
+    page.wait_for_url("**/#/runs/*")
+    # The marks of the first outcome of the legend come first.
+    expect(page.get_by_role("heading", level=1)).to_contain_text(Outcome.BOUND)
+
+
+def test_the_name_of_a_study_is_text_whatever_it_holds(page: Page, url: str, store: Path) -> None:
+    study = load_study("critical-hamaker")
+    name = "<img src=x onerror=alert(1)>"
+    traced = Boundary(
+        study_key=study.key, study=study.model_dump(mode="json"), name=name, points=[], updated=EARLIER
+    )
+    with Store.existing(store) as opened:
+        opened.save_boundary(traced)
+    page.goto(f"{url}/#/boundaries/{study.key}")
+    expect(page.get_by_text(name).first).to_be_visible()
+    assert page.locator("main img").count() == 0
+
+
+def test_a_run_is_played_and_everything_moves_together(page: Page, url: str, run_path: str, run: Run) -> None:
+    page.goto(url + run_path)
+    page.locator(".histories .main-svg").first.wait_for()
+    start = picture(page)
+    page.get_by_role("button", name="Play").click()
+    wait_until(lambda: clock(page) > 3)
+    page.get_by_role("button", name="Pause").click()
+    stopped = clock(page)
+    assert picture(page) != start
+    line = across(page)
+    page.locator(".player canvas").press("Home")
+    start_line = across(page)
+    page.locator(".player canvas").press("End")
+    share = (line - start_line) / (across(page) - start_line)
+    assert share == pytest.approx(stopped / run.frames.time[-1], abs=0.005)
+    # The address is a link to this moment.
+    page.get_by_role("slider", name="Time").fill(str(stopped))
+    page.get_by_role("button", name="Next frame").click()
+    moment = run.frames.time[run.frames.time > stopped][0]
+    page.wait_for_url(f"**time={moment:.2f}")
+    shown = picture(page)
+    page.reload()
+    wait_until(lambda: page.locator(".player canvas").count() and picture(page) == shown, seconds=20)
+    assert clock(page) == moment
+
+
+def test_the_player_obeys_the_keyboard(page: Page, url: str, run_path: str, run: Run) -> None:
+    times = [round(time, 1) for time in run.frames.time.tolist()]
+    page.goto(url + run_path)
+    page.locator(".player canvas").focus()
+    page.keyboard.press("End")
+    assert clock(page) == times[-1]
+    page.keyboard.press("ArrowLeft")
+    assert clock(page) == times[-2]
+    page.keyboard.press("Home")
+    page.keyboard.press("ArrowRight")
+    assert clock(page) == times[1]
+    page.keyboard.press(" ")
+    expect(page.get_by_role("button", name="Pause")).to_be_visible()
+    page.keyboard.press(" ")
+    expect(page.get_by_role("button", name="Play")).to_be_visible()
+    page.get_by_role("slider", name="Time").fill("7.5")
+    assert clock(page) == 7.5
+
+
+def test_states_between_frames_are_cubic(page: Page, url: str) -> None:
+    page.goto(url)
+    weights = "async time => (await import('/assets/frames.js')).hermiteWeights([0, 1, 2, 3], time)"
+    for time in (1.0, 1.25, 1.9):
+        values = page.evaluate(weights, time)
+        assert sum(values) == pytest.approx(1)
+        assert sum(value * at**2 for at, value in enumerate(values)) == pytest.approx(time**2)
+
+
+def test_a_job_is_canceled(page: Page, url: str) -> None:
+    page.goto(f"{url}/#/jobs")
+    work = {"preset": "doublet-shear", "set": {"criteria.revolutions": 1000, "horizon": 1e5}}
+    job = httpx.post(f"{url}/jobs", json=work).json()
+    row = page.get_by_role("row").filter(has=page.locator(f"#job-{job['id']}"))
+    expect(row).to_contain_text("running", timeout=30_000)
+    row.get_by_role("button", name="Cancel").click()
+    expect(row).to_contain_text("dismissed")
+    expect(row.get_by_role("button")).to_have_count(0)
+    assert httpx.get(f"{url}/jobs/{job['id']}").json()["status"] == "dismissed"
+
+
+def test_a_critical_value_is_read_off(page: Page, url: str, boundary: str, finished_study: Any) -> None:
+    expected = finished_study.document["boundary"][1]["critical_value"]
+    page.goto(url + boundary)
+    page.get_by_label("At shear rate").fill("0.75")
+    page.get_by_role("button", name="Read").click()
+    expect(page.get_by_text(f"{expected:.4g}", exact=True)).to_be_visible()
+    page.get_by_label("At shear rate").fill("9")
+    page.get_by_role("button", name="Read").click()
+    expect(page.get_by_role("alert")).to_contain_text("must lie within")
+
+
+def test_runs_are_filtered(page: Page, url: str, store: Path) -> None:
+    conditions = ["flow.rate>0.8", "adhesion.hamaker<2", "numerics.points=32"]
+    with Store.existing(store) as opened:
+        found = opened.summaries([*conditions, "outcome=bound"])
+    page.goto(f"{url}/#/runs")
+    page.get_by_label("Outcome").select_option("bound")
+    page.get_by_label("Conditions").fill(", ".join(conditions))
+    page.get_by_role("button", name="Filter").click()
+    expect(page.get_by_role("link", name="Play")).to_have_count(len(found))
+    page.get_by_label("Conditions").fill("flow.speed>1")
+    page.get_by_role("button", name="Filter").click()
+    expect(page.get_by_role("alert")).to_contain_text("flow.speed")
+
+
+def test_a_token_is_asked_for_where_one_is_needed(page: Page, store: Path, tmp_path: Path) -> None:
+    guarded = Path(shutil.copytree(store, tmp_path / "store"))
+    token = make_token(guarded, "ada", Scope.READ, timedelta(hours=1))
+    with serving(guarded) as url:
+        page.goto(url)
+        expect(page.get_by_role("dialog")).to_contain_text("asks for a token")
+        page.get_by_label("Token", exact=True).fill("wrong")
+        page.keyboard.press("Enter")
+        expect(page.get_by_role("dialog")).to_contain_text("does not accept this token")
+        page.get_by_label("Token", exact=True).fill(token)
+        page.keyboard.press("Enter")
+        expect(page.get_by_role("heading", level=1)).to_contain_text("Critical Hamaker constant")
+
+
+@pytest.mark.parametrize(("viewport", "scheme"), [(WIDE, "light"), (NARROW, "dark")], ids=["wide", "narrow"])
+def test_every_view_fits_and_keeps_to_itself(
+    browser: Browser, url: str, run_path: str, viewport: dict[str, int], scheme: str
+) -> None:
+    messages: list[str] = []
+    asked: set[str] = set()
+
+    def note(message: ConsoleMessage) -> None:
+        if message.type in ("error", "warning"):
+            messages.append(message.text)
+
+    with browser.new_context(viewport=viewport, color_scheme=scheme) as context:  # type: ignore[arg-type]
+        page = context.new_page()
+        page.on("console", note)
+        page.on("request", lambda request: asked.add(request.url))
+        for view, heading in (VIEWS | {run_path: Outcome.BOUND}).items():
+            page.goto(url + view)
+            expect(page.get_by_role("heading", level=1)).to_contain_text(heading)
+            if view in ("/", run_path):
+                page.locator(".plot .main-svg").first.wait_for()
+            assert page.evaluate("document.documentElement.scrollWidth") <= viewport["width"], view
+        background = "getComputedStyle(document.body).backgroundColor"
+        channels = [int(value) for value in re.findall(r"\d+", page.evaluate(background))]
+        assert (sum(channels) < 3 * 64) == (scheme == "dark")
+        page.get_by_label("Colors").select_option("light" if scheme == "dark" else "dark")
+        channels = [int(value) for value in re.findall(r"\d+", page.evaluate(background))]
+        assert (sum(channels) < 3 * 64) == (scheme == "light")
+    assert [message for message in messages if not message.startswith(EXPECTED_MESSAGE)] == []
+    assert len(messages) == 1
+    assert {address for address in asked if not address.startswith((url, "data:", "about:"))} == set()
+
+
+def test_the_page_runs_no_script_but_its_own(page: Page, url: str) -> None:
+    response = page.goto(url)
+    assert response is not None
+    policy = response.headers["content-security-policy"]
+    assert "script-src 'self';" in policy
+    assert "unsafe" not in policy
+    page.evaluate(
+        "() => { const script = document.createElement('script'); script.textContent = 'window.isOwned = 1';"
+        " document.body.append(script); }"
+    )
+    assert page.evaluate("window.isOwned") is None
+
+
+def test_a_job_is_followed_across_a_restart_of_the_service(page: Page, tmp_path: Path) -> None:
+    store = tmp_path / "store"
+    first = start_service(store, tmp_path / "first.log", workers=0)
+    work = {"preset": "doublet-shear", "set": {"horizon": 4.0, "criteria.extensions": 1.0}}
+    job = httpx.post(f"{first.url}/jobs", json=work).json()
+    page.goto(f"{first.url}/#/jobs/{job['id']}")
+    expect(page.locator(".job-status")).to_contain_text("accepted")
+    first.process.kill()
+    first.process.wait()
+    with service(store, tmp_path / "second.log", port=first.port):
+        expect(page.locator(".job-status")).to_contain_text("succeeded", timeout=60_000)
+        page.get_by_role("link", name="Run", exact=True).click()
+        expect(page.get_by_role("heading", level=1)).to_contain_text(Outcome.UNDECIDED)
