@@ -33,7 +33,8 @@ def mpirun_command(ranks: int, arguments: Sequence[str]) -> list[str]:
     mpirun = str(beside) if beside.exists() else shutil.which("mpirun")
     if mpirun is None:
         raise BadInput("mpirun: there is none on the PATH (the extra 'mpich' brings one)")
-    return [mpirun, "-n", str(ranks), sys.executable, "-m", "ensemble.cli", *arguments]
+    # -P: a folder of a package's name where the service was started must not take its place.
+    return [mpirun, "-n", str(ranks), sys.executable, "-P", "-m", "ensemble.cli", *arguments]
 
 
 class Process:
@@ -53,7 +54,7 @@ class Process:
         self.last_words = ""
         self._output: IO[str] = tempfile.TemporaryFile("w+", encoding="utf-8")  # noqa: SIM115
         self._watcher = subprocess.Popen(
-            [sys.executable, "-m", "api.watcher", *command],
+            [sys.executable, "-P", "-m", "api.watcher", *command],
             stdin=subprocess.PIPE,  # its end tells the watcher that this process is gone
             stdout=self._output,
             stderr=subprocess.PIPE,

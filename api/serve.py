@@ -88,7 +88,7 @@ def configuration(app: FastAPI, settings: Settings, host: str, port: int) -> uvi
 
 
 def _beside_workers(service: Service, workers: int) -> Callable[[FastAPI], AbstractAsyncContextManager[None]]:
-    command = [sys.executable, "-m", "ensemble.cli", "worker", "--end-with-input"]
+    command = [sys.executable, "-P", "-m", "ensemble.cli", "worker", "--end-with-input"]
     command += ["--store", str(service.store.path)]
 
     @asynccontextmanager
