@@ -40,7 +40,7 @@ class Motion:
 
     velocity : (2, M, N); turning : n · u_s, (M, N); tension : (M, N)
     bending, adhesion : force densities (2, M, N)
-    closeness : None for a single vesicle; adhesion : None for a scene without
+    closeness : None for a single curve; adhesion : None for a scene without
     """
 
     geometry: Geometry

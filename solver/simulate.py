@@ -5,21 +5,20 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
-from solver.diagnostics import Recorder, conserved_quantities
-from solver.dynamics import Dynamics
-from solver.geometry import Geometry, Membranes
-from solver.integrators import Integrator, Step, StepFailedError, integrator_for
+from solver import results
+from solver.diagnostics import Recorder
+from solver.geometry import Membranes
+from solver.integrators import StepFailedError
 from solver.orbit import Orbit
 from solver.outcome import History, criteria_of, latest_time
 from solver.resolution import UnresolvedError, carried, resolution_of, with_points
-from solver.run import LARGEST_SPATIAL, Energy, Errors, Outcome, Run, Series, Viscosity, Work
-from solver.scene import Extension, Scene, Shear, Start, Trap
+from solver.run import LARGEST_SPATIAL, Energy, Errors, Outcome, Run, Work
+from solver.scene import Scene, Shear, Start
+from solver.stage import Cost, Stage
 from solver.start import placed_state, turned_state
 from solver.tension import TensionNotFoundError
 
@@ -40,65 +39,6 @@ class _Progress:
     rejected: int = 0
     smallest_step: float | None = None
     temporal_error: float = 0.0
-
-
-class _Cost(NamedTuple):
-    """What a run has cost so far."""
-
-    evaluations: int = 0
-    jacobians: int = 0
-    factorizations: int = 0
-
-
-class _Stage:
-    """The part of a run that has one number of points.
-
-    Parameters
-    ----------
-    scene : Scene
-        With that number.
-    before : _Cost
-        Of the parts before this one.
-    """
-
-    def __init__(self, scene: Scene, before: _Cost) -> None:
-        self.dynamics = Dynamics.of(scene)
-        self._scene = scene
-        self._before = before
-        self._integrator: Integrator | None = None
-
-    @property
-    def membranes(self) -> Membranes:
-        """What stays the same while this part lasts."""
-        return self.dynamics.membranes
-
-    def begin(self, time: float, state: Array, latest: float) -> None:
-        """Make the integrator that goes on from this state, until ``latest`` at most."""
-        self._integrator = integrator_for(
-            self._scene.numerics,
-            len(self._scene.vesicles),
-            self.dynamics.rate,
-            self.dynamics.jacobian,
-            lambda state: conserved_quantities(Geometry(self.membranes, state)),
-            state,
-            latest,
-            time,
-        )
-
-    def step(self) -> Step:
-        """Take one step."""
-        assert self._integrator
-        return self._integrator.step()
-
-    @property
-    def cost(self) -> _Cost:
-        """What the run has cost up to now."""
-        integrator = self._integrator
-        return _Cost(
-            self._before.evaluations + self.dynamics.evaluations,
-            self._before.jacobians + (integrator.jacobian_evaluations if integrator else 0),
-            self._before.factorizations + (integrator.factorizations if integrator else 0),
-        )
 
 
 def simulate(
@@ -126,7 +66,7 @@ def simulate(
     resolution = resolution_of(scene)
     start = _start(scene, resolution.points, should_stop)
     latest = latest_time(scene)
-    stage = _Stage(with_points(scene, start.points), _Cost())
+    stage = Stage(with_points(scene, start.points), Cost())
     orbit = None
     if len(scene.vesicles) == 2:
         orbit = Orbit(stage.membranes, start.state, scene.criteria.separated_distance)
@@ -143,7 +83,7 @@ def simulate(
             step = stage.step()
             points = resolution.finer(stage.membranes, step.end, step.state)
             if points is not None:
-                coarse, stage = stage.membranes, _Stage(with_points(scene, points), stage.cost)
+                coarse, stage = stage.membranes, Stage(with_points(scene, points), stage.cost)
                 progress.state = carried(coarse, progress.state, stage.membranes)
                 progress.rejected += 1
                 recorder.continue_with(stage.dynamics)
@@ -246,10 +186,10 @@ def _summary(
         failure=failure,
         time=progress.time,
         period=period,
-        effective_aspect_ratio=_effective_aspect_ratio(period, scene),
-        inclination_angle=_inclination(scene, series),
-        gap=_last(series, "gap"),
-        viscosity=_viscosity(series, outcome, orbit),
+        effective_aspect_ratio=results.effective_aspect_ratio(period, scene),
+        inclination_angle=results.inclination(scene, series),
+        gap=float(series["gap"][-1]) if "gap" in series else None,
+        viscosity=results.viscosity(series, outcome, orbit),
         energy=Energy(
             bending=float(series["bending_energy"][-1]),
             adhesion=None if adhesion_energy is None else float(adhesion_energy[-1]),
@@ -264,52 +204,3 @@ def _summary(
         series=series,
         frames=recorder.frames,
     )
-
-
-def _last(series: Series, name: str) -> float | None:
-    return float(series[name][-1]) if name in series else None
-
-
-def _effective_aspect_ratio(period: float | None, scene: Scene) -> float | None:
-    """Aspect ratio λ ≥ 1 of the rigid ellipse with this period, p = 2π/rate·(λ + 1/λ) (paper, eq. 9)."""
-    if period is None or not isinstance(scene.flow, Shear):
-        return None
-    half_sum = period * scene.flow.rate / (4 * np.pi)
-    return float(half_sum + np.sqrt(half_sum**2 - 1)) if half_sum >= 1 else None
-
-
-def _inclination(scene: Scene, series: Series) -> float | None:
-    """Degrees: of the long axis of a single vesicle against x, or of a trapped pair as the paper defines it.
-
-    For the pair it is 180° when the line of centers lies on the diverging axis and 90° when it lies on the
-    converging one (paper, figure 6).
-    """
-    if "inclination_angle" in series:
-        return float(np.degrees(series["inclination_angle"][-1]))
-    if isinstance(scene.flow, Extension | Trap) and "center_angle" in series:
-        return 90 + float(np.degrees(np.arcsin(abs(np.sin(series["center_angle"][-1])))))
-    return None
-
-
-def _viscosity(series: Series, outcome: Outcome, orbit: Orbit | None) -> Viscosity | None:
-    """Average over a pair's last full turn, or the value in the steady state; None while neither exists."""
-    if "viscosity_bending_tension" not in series:
-        return None
-    if outcome is Outcome.STEADY:
-
-        def average(name: str) -> float:
-            return float(series[name][-1])
-
-    elif orbit and orbit.period:
-        first, last = orbit.half_turns[-3], orbit.half_turns[-1]
-
-        def average(name: str) -> float:
-            return float(CubicSpline(series["time"], series[name]).integrate(first, last)) / (last - first)
-
-    else:
-        return None
-    membrane = average("viscosity_bending_tension")
-    if "viscosity_adhesion" not in series:
-        return Viscosity(total=membrane, bending_tension=membrane, adhesion=None)
-    adhesion = average("viscosity_adhesion")
-    return Viscosity(total=membrane + adhesion, bending_tension=membrane, adhesion=adhesion)

@@ -1,0 +1,55 @@
+"""What a finished run says about its scene, from the series that were recorded and the orbit of a pair."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from solver.orbit import Orbit
+from solver.run import Outcome, Series, Viscosity
+from solver.scene import Extension, Scene, Shear, Trap
+
+
+def effective_aspect_ratio(period: float | None, scene: Scene) -> float | None:
+    """Aspect ratio λ ≥ 1 of the rigid ellipse with this period, p = 2π/rate·(λ + 1/λ) (paper, eq. 9)."""
+    if period is None or not isinstance(scene.flow, Shear):
+        return None
+    half_sum = period * scene.flow.rate / (4 * np.pi)
+    return float(half_sum + np.sqrt(half_sum**2 - 1)) if half_sum >= 1 else None
+
+
+def inclination(scene: Scene, series: Series) -> float | None:
+    """Degrees: of the long axis of a single vesicle against x, or of a trapped pair as the paper defines it.
+
+    For the pair it is 180° when the line of centers lies on the diverging axis and 90° when it lies on the
+    converging one (paper, figure 6).
+    """
+    if "inclination_angle" in series:
+        return float(np.degrees(series["inclination_angle"][-1]))
+    if isinstance(scene.flow, Extension | Trap) and "center_angle" in series:
+        return 90 + float(np.degrees(np.arcsin(abs(np.sin(series["center_angle"][-1])))))
+    return None
+
+
+def viscosity(series: Series, outcome: Outcome, orbit: Orbit | None) -> Viscosity | None:
+    """Average over a pair's last full turn, or the value in the steady state; None while neither exists."""
+    if "viscosity_bending_tension" not in series:
+        return None
+    if outcome is Outcome.STEADY:
+
+        def average(name: str) -> float:
+            return float(series[name][-1])
+
+    elif orbit and orbit.period:
+        first, last = orbit.half_turns[-3], orbit.half_turns[-1]
+
+        def average(name: str) -> float:
+            return float(CubicSpline(series["time"], series[name]).integrate(first, last)) / (last - first)
+
+    else:
+        return None
+    membrane = average("viscosity_bending_tension")
+    if "viscosity_adhesion" not in series:
+        return Viscosity(total=membrane, bending_tension=membrane, adhesion=None)
+    adhesion = average("viscosity_adhesion")
+    return Viscosity(total=membrane + adhesion, bending_tension=membrane, adhesion=adhesion)
