@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict
@@ -133,7 +133,16 @@ def preset_work(name: str, changes: Mapping[str, Any]) -> Work:
     ValueError
         If there is no such preset, or it does not allow one of the changes; names the field.
     """
-    document = override(preset_document(name), changes)
+    return _of_document(name, override(preset_document(name), changes)) if changes else _plain_preset(name)
+
+
+@cache
+def _plain_preset(name: str) -> Work:
+    """Check a preset once: most jobs are one as it is."""
+    return _of_document(name, preset_document(name))
+
+
+def _of_document(name: str, document: dict[str, Any]) -> Work:
     if "search" in document:
         study = validated(Study, document)
         return Work(study.name, study)

@@ -36,7 +36,7 @@ def smallest_change(path: tuple[str | int, ...], value: Any) -> Any:
         return value + (2 if path[-1] == "points" else 1)
     if isinstance(value, float):
         return math.nextafter(value, -1.0)
-    return {"shear": "extension", "bdf": "sdc"}[value]
+    return {"shear": "extension", "auto": "bdf"}[value]
 
 
 def test_key_is_32_hexadecimal_digits() -> None:
