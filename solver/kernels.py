@@ -9,7 +9,6 @@ from solver.compilation import compiled, widest_vectors
 from solver.logarithm import LOGARITHM_UNIT, logarithm_and_reciprocal
 
 Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 
 @compiled

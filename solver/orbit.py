@@ -13,6 +13,7 @@ from solver.integrators import Step
 
 Array = NDArray[np.float64]
 
+# A pair may start beyond the separated distance; then it has to move this much farther than its start.
 _FARTHER = 1.5
 
 

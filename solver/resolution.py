@@ -88,8 +88,9 @@ class AdaptiveResolution:
 
     def finer(self, membranes: Membranes, time: float, state: Array) -> int | None:
         """See `Resolution`."""
-        apart = self._apart(membranes, state)
-        if apart and self._smooth(membranes, time, state):
+        geometry = Geometry(membranes, state)
+        apart = self._apart(geometry)
+        if apart and self._smooth(geometry, time, state):
             return None
         higher = next((points for points in LADDER if points > membranes.points), None)
         if higher is None and not apart:
@@ -102,20 +103,21 @@ class AdaptiveResolution:
         for points in LADDER:
             placed = with_points(scene, points)
             membranes, state = Membranes.of_scene(placed), placed_state(placed)
+            geometry = Geometry(membranes, state)
             drawn_together = self._closest >= self._least_distance * membranes.spacing.max()
-            if drawn_together and self._apart(membranes, state) and self._smooth(membranes, 0.0, state):
+            if drawn_together and self._apart(geometry) and self._smooth(geometry, 0.0, state):
                 return points
         return LADDER[-1]
 
-    def _smooth(self, membranes: Membranes, time: float, state: Array) -> bool:
-        error = spatial_error(shape_tails(membranes, state), self._rate * time)
-        error += waist_error(Geometry(membranes, state))
+    def _smooth(self, geometry: Geometry, time: float, state: Array) -> bool:
+        error = spatial_error(shape_tails(geometry.membranes, state), self._rate * time)
+        error += waist_error(geometry)
         return bool(np.all(error <= self._tolerance))
 
-    def _apart(self, membranes: Membranes, state: Array) -> bool:
+    def _apart(self, geometry: Geometry) -> bool:
         if self._least_distance == 0:
             return True
-        return Closeness(Geometry(membranes, state)).nearest >= self._least_distance
+        return Closeness(geometry).nearest >= self._least_distance
 
 
 def _rates(scene: Scene) -> Array:

@@ -130,7 +130,8 @@ class Numerics(Model):
 class Criteria(Model):
     """When a run is decided.  The criteria are part of the answer and are stored with it."""
 
-    separated_distance: Positive = 12.0  # center distance that counts as separated when passed outward
+    # Center distance that counts as separated when passed outward; 1.5 times the first one if that is more.
+    separated_distance: Positive = 12.0
     revolutions: int = Field(1, ge=1)  # of the line of centers that a bound pair has completed
     gap_growth: NonNegative = 0.01  # relative growth of the gap's maximum that still counts as none
     steady_rate: Positive = 1e-5  # change of every tangent angle and center below which a state is steady
