@@ -31,6 +31,7 @@ class Vesicle(Model):
     reduced_area: float = Field(0.9, gt=0, le=1)  # 4π·area/length²
     length: Positive = 2 * math.pi
     bending_modulus: Positive = 1.0
+    viscosity_contrast: Positive = 1.0  # of the fluid inside to that outside
     center: tuple[float, float] = (0.0, 0.0)
     angle: float = math.pi / 2  # of the long axis against x, radians
 
@@ -57,12 +58,19 @@ class Adhesion(Model):
     hamaker: NonNegative
     distance: Positive
     exponents: tuple[int, int] = (4, 2)
+    cutoff: Positive | None = None  # distance beyond which points do not attract; None: they always do
 
     @model_validator(mode="after")
     def _ordered_exponents(self) -> Self:
         m, n = self.exponents
         if not m > n >= 2:
             raise ValueError(f"exponents must be integers m > n >= 2, got [{m}, {n}]")
+        return self
+
+    @model_validator(mode="after")
+    def _cutoff_beyond_the_repulsion(self) -> Self:
+        if self.cutoff is not None and self.cutoff <= self.distance:
+            raise ValueError(f"cutoff must be more than the distance {self.distance}, got {self.cutoff}")
         return self
 
 
