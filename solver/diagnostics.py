@@ -71,6 +71,11 @@ def measures(setting: scene.Scene, dynamics: Dynamics) -> dict[str, Measure]:
         found["viscosity_bending_tension"] = lambda motion: scale * membrane_stress(motion)
         if adhesion:
             found["viscosity_adhesion"] = lambda motion: scale * adhesion_stress(motion)
+        contrast = dynamics.contrast
+        if contrast:
+            found["viscosity_contrast"] = lambda motion: (
+                scale * contrast.stress(motion.geometry, motion.velocity)
+            )
     return found
 
 

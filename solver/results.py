@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from solver.orbit import Orbit
 from solver.run import Outcome, Series, Viscosity
 from solver.scene import Extension, Scene, Shear, Trap
+from solver.turns import Turns
 
 
 def effective_aspect_ratio(period: float | None, scene: Scene) -> float | None:
@@ -31,8 +31,8 @@ def inclination(scene: Scene, series: Series) -> float | None:
     return None
 
 
-def viscosity(series: Series, outcome: Outcome, orbit: Orbit | None) -> Viscosity | None:
-    """Average over a pair's last full turn, or the value in the steady state; None while neither exists."""
+def viscosity(series: Series, outcome: Outcome, turns: Turns | None) -> Viscosity | None:
+    """Average over the last full turn, or the value in the steady state; None while neither exists."""
     if "viscosity_bending_tension" not in series:
         return None
     if outcome is Outcome.STEADY:
@@ -40,8 +40,8 @@ def viscosity(series: Series, outcome: Outcome, orbit: Orbit | None) -> Viscosit
         def average(name: str) -> float:
             return float(series[name][-1])
 
-    elif orbit and orbit.period:
-        first, last = orbit.half_turns[-3], orbit.half_turns[-1]
+    elif turns and turns.period:
+        first, last = turns.half_turns[-3], turns.half_turns[-1]
 
         def average(name: str) -> float:
             return float(CubicSpline(series["time"], series[name]).integrate(first, last)) / (last - first)
@@ -49,7 +49,8 @@ def viscosity(series: Series, outcome: Outcome, orbit: Orbit | None) -> Viscosit
     else:
         return None
     membrane = average("viscosity_bending_tension")
-    if "viscosity_adhesion" not in series:
-        return Viscosity(total=membrane, bending_tension=membrane, adhesion=None)
-    adhesion = average("viscosity_adhesion")
-    return Viscosity(total=membrane + adhesion, bending_tension=membrane, adhesion=adhesion)
+    adhesion, contrast = (
+        average(name) if name in series else None for name in ("viscosity_adhesion", "viscosity_contrast")
+    )
+    total = membrane + (adhesion or 0.0) + (contrast or 0.0)
+    return Viscosity(total=total, bending_tension=membrane, adhesion=adhesion, contrast=contrast)

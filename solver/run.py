@@ -22,17 +22,23 @@ class Outcome(StrEnum):
     SEPARATED = "separated"
     EQUILIBRIUM = "equilibrium"
     STEADY = "steady"
+    TUMBLING = "tumbling"
     UNDECIDED = "undecided"
     FAILED = "failed"
 
 
 @dataclass(frozen=True)
 class Viscosity:
-    """Intrinsic viscosity −∫ f_x y ds/(rate·area), averaged over time; no adhesion part without adhesion."""
+    """Intrinsic viscosity −∫ f_x y ds/(rate·area) by force, averaged over time.
+
+    ``contrast`` is what fluids inside add whose viscosity differs.  No adhesion part without adhesion, and
+    none of a contrast without one.
+    """
 
     total: float
     bending_tension: float
     adhesion: float | None
+    contrast: float | None = None
 
 
 @dataclass(frozen=True)
@@ -81,8 +87,8 @@ class Work:
 # Diagnostics by name, each of shape (time,) and sampled at `Series["time"]`.  Always present: time,
 # bending_energy, area_error, closure_error, state_rate.  With two or more vesicles: gap.  With exactly two:
 # center_distance, center_angle (of the line of centers, radians, unwrapped).  With adhesion:
-# adhesion_energy.  In shear: viscosity_bending_tension and, with adhesion, viscosity_adhesion.  With one
-# vesicle: inclination_angle (radians).
+# adhesion_energy.  In shear: viscosity_bending_tension and, with adhesion, viscosity_adhesion and, with a
+# contrast, viscosity_contrast.  With one vesicle: inclination_angle (radians).
 Series = Mapping[str, Array]
 
 
