@@ -19,7 +19,8 @@ from ensemble.study import Study, load_scene, load_study, preset_names
 from solver.run import Outcome
 from solver.scene import Adhesion, Scene, Shear, Trap
 
-STUDIES = ("critical-extension-rate", "critical-hamaker")
+DOUBLET_STUDIES = ("critical-extension-rate", "critical-hamaker", "critical-hamaker-contrast")
+STUDIES = (*DOUBLET_STUDIES, "critical-viscosity-contrast")
 SCENES = ("doublet-quiescent", "doublet-shear", "doublet-trap", "vesicle-shear")
 
 HAMAKER = load_study("critical-hamaker")
@@ -51,12 +52,12 @@ def test_every_preset_says_what_it_is_and_where_it_comes_from(name: str) -> None
         Path(__file__).parents[2].joinpath("ensemble", "presets", f"{name}.toml").read_text(encoding="utf-8")
     )
     comment = [line for line in text.split("\n\n")[0].splitlines() if line.startswith("# ")]
-    assert any("Quaife, Veerapaneni and Young" in line for line in comment)
+    assert any(line.startswith("# Source: ") for line in comment)
 
 
 def test_no_doublet_starts_in_contact() -> None:
     scenes = [load_scene(name) for name in SCENES]
-    for study in map(load_study, STUDIES):
+    for study in map(load_study, DOUBLET_STUDIES):
         scenes += [study.scene_at(sweep_value, study.search.limits[0]) for sweep_value in study.sweep.values]
     doublets = [scene.vesicles for scene in scenes if len(scene.vesicles) == 2]
     assert len(doublets) == len(scenes) - 1
@@ -104,6 +105,7 @@ def test_sides_of_outcomes() -> None:
         Outcome.END_TO_END: Side.UNDECIDED,
         Outcome.EQUILIBRIUM: Side.UNDECIDED,
         Outcome.STEADY: Side.UNDECIDED,
+        Outcome.TUMBLING: Side.UNDECIDED,
     }
     trap = load_study("critical-extension-rate")
     assert trap.side(Outcome.BOUND) is Side.LOW
