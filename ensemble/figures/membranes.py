@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
+from numpy.typing import NDArray
 
 from ensemble.figures.style import PALE, TENSION_COLORS
 from solver.curve import positions
@@ -22,15 +23,17 @@ _SPACE = 0.5  # between neighboring snapshots, in the unit of length
 
 
 def choose_snapshots(frames: Frames) -> list[int]:
-    """Return the indices of at most eight frames, evenly spread in time, the first and the last among them.
-
-    Frames of which a position is not finite, as a failed run may end with, are passed over.
-    """
-    finite = np.isfinite(frames.tangent_angle).all(axis=(1, 2)) & np.isfinite(frames.center).all(axis=(1, 2))
-    drawable = np.flatnonzero(finite)
+    """Return the indices of at most eight finite frames, evenly spread in time, first and last among them."""
+    drawable = finite_frames(frames)
     times = frames.time[drawable]
     wanted = np.linspace(times[0], times[-1], _MOST_SNAPSHOTS)
     return sorted({int(drawable[np.abs(times - time).argmin()]) for time in wanted})
+
+
+def finite_frames(frames: Frames) -> NDArray[np.intp]:
+    """Return the indices of the frames of which every position is finite; failed runs may end with others."""
+    finite = np.isfinite(frames.tangent_angle).all(axis=(1, 2)) & np.isfinite(frames.center).all(axis=(1, 2))
+    return np.flatnonzero(finite)
 
 
 def membrane_segments(
@@ -87,7 +90,7 @@ def draw_membranes(axes: Axes, scene: Scene, frames: Frames) -> LineCollection:
     lines = LineCollection(
         list(ends.reshape(-1, 2, 2)),
         cmap=TENSION_COLORS,
-        norm=_scale(tension),
+        norm=tension_scale(tension),
         linewidths=1.6,
         capstyle="round",
     )
@@ -114,7 +117,7 @@ def extension(membranes: LineCollection) -> Literal["neither", "min", "max", "bo
     return "min" if below else "max" if above else "neither"
 
 
-def _scale(tension: Array) -> Normalize:
+def tension_scale(tension: Array) -> Normalize:
     """Color scale over the finite tensions, never so narrow that it would show rounding errors.
 
     The first snapshot does not count where there are others: an ellipse that has not relaxed yet has
