@@ -20,6 +20,7 @@ from solver.bending import Bending
 from solver.flow import ImposedFlow, imposed_flow
 from solver.geometry import Geometry, Membranes
 from solver.gliding import glide, gliding_direction, gliding_speed, gliding_speed_by_curvature
+from solver.parallel import SERIAL, Parallel
 from solver.proximity import Closeness
 from solver.scene import Numerics, Scene
 from solver.spectral import differentiation, highest_modes, integration
@@ -68,18 +69,18 @@ class Dynamics:
     evaluations: int = field(default=0, init=False)
 
     @classmethod
-    def of(cls, scene: Scene) -> Self:
-        """The terms of a scene."""
+    def of(cls, scene: Scene, parallel: Parallel = SERIAL) -> Self:
+        """The terms of a scene, computed together by these ranks."""
         membranes = Membranes.of_scene(scene)
         several = membranes.curves > 1
         accuracy = accuracy_of(scene.numerics)
         return cls(
             membranes=membranes,
             bending=Bending(),
-            adhesion=Adhesion(scene.adhesion, accuracy) if scene.adhesion and several else None,
+            adhesion=Adhesion(scene.adhesion, accuracy, parallel) if scene.adhesion and several else None,
             flow=imposed_flow(scene.flow, membranes) if scene.flow else None,
             inextensibility=Inextensibility(accuracy, 1e-3 * accuracy if several else ROUND_OFF),
-            layer=SingleLayer(membranes, accuracy),
+            layer=SingleLayer(membranes, accuracy, parallel),
         )
 
     def motion(self, state: Array) -> Motion:
