@@ -106,7 +106,7 @@ with abort_guard(communicator):
     try:
         simulate(DOUBLET, parallel=Ranks(communicator), should_stop=stop)
     except Cancelled:
-        print("cancelled", len(asked), end=" ")
+        print(f" cancelled {len(asked)} ", end="")
 """
 
 
