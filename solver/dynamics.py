@@ -22,12 +22,15 @@ from solver.contrast import ViscosityContrast, contrasts
 from solver.flow import ImposedFlow, imposed_flow
 from solver.geometry import Geometry, Membranes
 from solver.gliding import glide, gliding_direction, gliding_speed, gliding_speed_by_curvature
+from solver.parallel import SERIAL, Parallel
 from solver.proximity import Closeness
+from solver.scene import Adhesion as AdhesionParameters
 from solver.scene import Numerics, Scene
 from solver.spectral import differentiation, highest_modes, integration
 from solver.stokes import SingleLayer
 from solver.symmetry import independent_vesicles
 from solver.tension import ROUND_OFF, Inextensibility
+from solver.truncated_adhesion import TruncatedAdhesion
 
 Array = NDArray[np.float64]
 
@@ -55,6 +58,25 @@ class Motion:
     adhesion: Array | None
 
 
+def state_change(motion: Motion) -> Array:
+    """How a state changes whose motion this is, (state_size,); see `Dynamics.rate`."""
+    turning = motion.turning.copy()
+    points = turning.shape[1]
+    glide(motion.geometry.curvature, turning, highest_modes(points))
+    return np.concatenate([turning.ravel(), motion.velocity.sum(axis=2).ravel() / points])
+
+
+def _adhesion(
+    parameters: AdhesionParameters | None, accuracy: float, membranes: Membranes, parallel: Parallel
+) -> Adhesion | None:
+    """The adhesion that several vesicles have."""
+    if parameters is None:
+        return None
+    if parameters.cutoff is not None:
+        return TruncatedAdhesion(parameters, accuracy, membranes)
+    return Adhesion(parameters, accuracy, parallel)
+
+
 @dataclass
 class Dynamics:
     """Right-hand side and Jacobian of the equation of motion.
@@ -72,8 +94,8 @@ class Dynamics:
     evaluations: int = field(default=0, init=False)
 
     @classmethod
-    def of(cls, scene: Scene) -> Self:
-        """The terms of a scene."""
+    def of(cls, scene: Scene, parallel: Parallel = SERIAL) -> Self:
+        """The terms of a scene, computed together by these ranks."""
         membranes = Membranes.of_scene(scene)
         several = membranes.curves > 1
         accuracy = accuracy_of(scene.numerics)
@@ -82,10 +104,10 @@ class Dynamics:
         return cls(
             membranes=membranes,
             bending=Bending(),
-            adhesion=Adhesion(scene.adhesion, accuracy) if scene.adhesion and several else None,
+            adhesion=_adhesion(scene.adhesion, accuracy, membranes, parallel) if several else None,
             flow=imposed_flow(scene.flow, membranes) if scene.flow else None,
             inextensibility=Inextensibility(accuracy, 1e-3 * accuracy if several else ROUND_OFF),
-            layer=SingleLayer(membranes, accuracy),
+            layer=SingleLayer(membranes, accuracy, parallel),
             contrast=ViscosityContrast(contrast, membranes, accuracy) if differ else None,
         )
 
@@ -117,9 +139,7 @@ class Dynamics:
 
     def rate_of(self, motion: Motion) -> Array:
         """`rate` in the state of a motion."""
-        turning = motion.turning.copy()
-        glide(motion.geometry.curvature, turning, highest_modes(self.membranes.points))
-        return np.concatenate([turning.ravel(), motion.velocity.sum(axis=2).ravel() / self.membranes.points])
+        return state_change(motion)
 
     def jacobian(self, state: Array) -> Array:
         """Derivative of `rate`, (state_size, state_size).
@@ -128,16 +148,30 @@ class Dynamics:
         """
         motion = self.motion(state)
         geometry = motion.geometry
+        adhesion = flow = None
+        if self.adhesion and motion.closeness:
+            adhesion = self.adhesion.jacobian(geometry, motion.closeness)
+        if self.flow:
+            flow = self.flow.jacobian(self.point_derivatives(geometry))
+        return self.linearized(motion, adhesion, flow)
+
+    def linearized(self, motion: Motion, adhesion: Array | None, flow: Array | None) -> Array:
+        """`jacobian` in the state of a motion, whose geometry was the last one assembled.
+
+        ``adhesion`` and ``flow``, (2, M·N, state), are the derivatives of these by the state, where there are
+        such terms.
+        """
+        geometry = motion.geometry
         force = self.bending.jacobian(geometry)
         self._add_tension_turning(motion, force)
-        if self.adhesion and motion.closeness:
-            force += self.adhesion.jacobian(geometry, motion.closeness)
+        if adhesion is not None:
+            force += adhesion
         weights = np.repeat(self.membranes.spacing, self.membranes.points)[:, None]
         force *= weights
         velocity = self.layer.columns(force)
         velocity += self.layer.jacobian(geometry, self._point_forces(motion))
-        if self.flow:
-            velocity += self.flow.jacobian(self._point_derivatives(geometry))
+        if flow is not None:
+            velocity += flow
         if self.contrast:
             velocity += self.contrast.jacobian(geometry, motion.velocity)
             velocity = self.contrast.velocity(velocity)
@@ -177,7 +211,7 @@ class Dynamics:
             self.contrast.assemble(geometry, closeness, self.layer)
         return geometry, closeness
 
-    def _point_derivatives(self, geometry: Geometry) -> Array:
+    def point_derivatives(self, geometry: Geometry) -> Array:
         """Derivatives of the points by the state, (2, M·N, state)."""
         count, points = self.membranes.count, self.membranes.points
         by_state = np.zeros((2, count * points, self.membranes.state_size))

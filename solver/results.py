@@ -31,8 +31,8 @@ def inclination(scene: Scene, series: Series) -> float | None:
     return None
 
 
-def viscosity(series: Series, outcome: Outcome, turns: Turns | None) -> Viscosity | None:
-    """Average over the last full turn, or the value in the steady state; None while neither exists."""
+def viscosity(scene: Scene, series: Series, outcome: Outcome, turns: Turns | None) -> Viscosity | None:
+    """As `solver.run.Viscosity` says which average it is; None while it does not exist."""
     if "viscosity_bending_tension" not in series:
         return None
     if outcome is Outcome.STEADY:
@@ -40,17 +40,27 @@ def viscosity(series: Series, outcome: Outcome, turns: Turns | None) -> Viscosit
         def average(name: str) -> float:
             return float(series[name][-1])
 
-    elif turns and turns.period:
-        first, last = turns.half_turns[-3], turns.half_turns[-1]
+    else:
+        interval = _averaged_over(scene, series, turns)
+        if interval is None:
+            return None
+        first, last = interval
 
         def average(name: str) -> float:
             return float(CubicSpline(series["time"], series[name]).integrate(first, last)) / (last - first)
 
-    else:
-        return None
     membrane = average("viscosity_bending_tension")
     adhesion, contrast = (
         average(name) if name in series else None for name in ("viscosity_adhesion", "viscosity_contrast")
     )
     total = membrane + (adhesion or 0.0) + (contrast or 0.0)
     return Viscosity(total=total, bending_tension=membrane, adhesion=adhesion, contrast=contrast)
+
+
+def _averaged_over(scene: Scene, series: Series, turns: Turns | None) -> tuple[float, float] | None:
+    """From when to when the viscosity of a run that is not steady is averaged; None while it cannot be."""
+    if turns:
+        return (turns.half_turns[-3], turns.half_turns[-1]) if turns.period else None
+    if len(scene.vesicles) == 1 or len(series["time"]) < 2:
+        return None
+    return float(series["time"][-1]) / 2, float(series["time"][-1])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 import numpy as np
@@ -33,6 +33,10 @@ class Viscosity:
 
     ``contrast`` is what fluids inside add whose viscosity differs.  No adhesion part without adhesion, and
     none of a contrast without one.
+
+    It is taken over a full turn, the last one, of a pair or of a tumbling vesicle, over the second half of a
+    run of three or more vesicles, and otherwise from the steady state.  A suspension with the area fraction φ
+    has the viscosity 1 + φ·[μ].
     """
 
     total: float
@@ -88,8 +92,15 @@ class Work:
 # bending_energy, area_error, closure_error, state_rate.  With two or more vesicles: gap.  With exactly two:
 # center_distance, center_angle (of the line of centers, radians, unwrapped).  With adhesion:
 # adhesion_energy.  In shear: viscosity_bending_tension and, with adhesion, viscosity_adhesion and, with a
-# contrast, viscosity_contrast.  With one vesicle: inclination_angle (radians).
+# contrast, viscosity_contrast.  With one vesicle: inclination_angle (radians).  With three or more vesicles
+# and adhesion: clusters (their number, single vesicles included) and largest_cluster (vesicles in it);
+# `contacts` says what a cluster is.
 Series = Mapping[str, Array]
+
+# What is measured of every vesicle where there are three or more, sampled at `Series["time"]`, by name:
+# vesicle_center (time, vesicles, 2), vesicle_inclination_angle (radians) and vesicle_area_error (relative),
+# both (time, vesicles); with adhesion vesicle_cluster, the number of its cluster, (time, vesicles).
+VesicleSeries = Mapping[str, Array]
 
 
 @dataclass(frozen=True)
@@ -126,3 +137,4 @@ class Run:
     work: Work
     series: Series
     frames: Frames
+    vesicle_series: VesicleSeries = field(default_factory=dict)

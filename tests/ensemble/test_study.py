@@ -21,7 +21,8 @@ from solver.scene import Adhesion, Scene, Shear, Trap
 
 DOUBLET_STUDIES = ("critical-extension-rate", "critical-hamaker", "critical-hamaker-contrast")
 STUDIES = (*DOUBLET_STUDIES, "critical-viscosity-contrast")
-SCENES = ("doublet-quiescent", "doublet-shear", "doublet-trap", "vesicle-shear")
+PUBLISHED = ("doublet-quiescent", "doublet-shear", "doublet-trap", "vesicle-shear")
+SCENES = (*PUBLISHED, "cluster-quiescent", "doublet-unequal", "suspension-shear")
 
 HAMAKER = load_study("critical-hamaker")
 GRID = GeometricGrid(HAMAKER.search.tolerance)
@@ -52,11 +53,12 @@ def test_every_preset_says_what_it_is_and_where_it_comes_from(name: str) -> None
         Path(__file__).parents[2].joinpath("ensemble", "presets", f"{name}.toml").read_text(encoding="utf-8")
     )
     comment = [line for line in text.split("\n\n")[0].splitlines() if line.startswith("# ")]
-    assert any(line.startswith("# Source: ") for line in comment)
+    sources = ("Quaife, Veerapaneni and Young", "Keller and Skalak")
+    assert any(source in line for line in comment for source in sources)
 
 
 def test_no_doublet_starts_in_contact() -> None:
-    scenes = [load_scene(name) for name in SCENES]
+    scenes = [load_scene(name) for name in PUBLISHED]
     for study in map(load_study, DOUBLET_STUDIES):
         scenes += [study.scene_at(sweep_value, study.search.limits[0]) for sweep_value in study.sweep.values]
     doublets = [scene.vesicles for scene in scenes if len(scene.vesicles) == 2]
@@ -84,6 +86,17 @@ def test_parameters_of_the_published_scenes() -> None:
     single = load_scene("vesicle-shear")
     assert len(single.vesicles) == 1
     assert single.adhesion is None
+
+
+@pytest.mark.parametrize("name", ["cluster-quiescent", "suspension-shear"])
+def test_tens_of_vesicles_begin_within_reach_of_adhesion_but_apart(name: str) -> None:
+    scene = load_scene(name)
+    assert len(scene.vesicles) == 24
+    assert scene == load_scene(name)
+    assert scene.vesicles != load_scene(name, ["arrangement.seed=2"]).vesicles
+    pair = load_scene("doublet-shear")
+    assert scene.adhesion == pair.adhesion
+    assert scene.flow in (None, pair.flow)
 
 
 def test_scene_at_sets_both_parameters_and_nothing_else() -> None:

@@ -100,6 +100,7 @@ def test_forces_feed_what_the_fluid_dissipates() -> None:
 TERMS = [
     (dynamics_module, "Adhesion"),
     (dynamics_module, "Closeness"),
+    (dynamics_module, "TruncatedAdhesion"),
     (dynamics_module, "ViscosityContrast"),
     (contrast_module, "DoubleLayer"),
     (flow_module, "LinearFlow"),
@@ -140,6 +141,10 @@ ADHESION = Adhesion(hamaker=1.0, distance=0.4)
         (
             {"vesicles": (VESICLE, OTHER), "adhesion": ADHESION, "flow": Shear(rate=0.5)},
             {"Closeness", "Adhesion", "LinearFlow"},
+        ),
+        (
+            {"vesicles": (VESICLE, OTHER), "adhesion": ADHESION.model_copy(update={"cutoff": 1.0})},
+            {"Closeness", "TruncatedAdhesion"},
         ),
         ({"vesicles": (VISCOUS,)}, {"ViscosityContrast", "DoubleLayer"}),
         ({"vesicles": (VISCOUS, OTHER)}, {"Closeness", "ViscosityContrast", "DoubleLayer"}),
