@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from http import HTTPStatus
 from typing import Annotated, Any
 
@@ -54,14 +55,14 @@ def requested(submission: Submission) -> Work:
     """
     try:
         if submission.preset is not None:
-            document = override(preset_document(submission.preset), submission.set)
-            _limit(kind_of(document), document)
+            document = preset_document(submission.preset)
+            _limit(kind_of(document), document, submission.set)
             return preset_work(submission.preset, submission.set)
         if submission.study is not None:
-            _limit(Kind.STUDY, override(submission.study.model_dump(mode="json"), submission.set))
+            _limit(Kind.STUDY, submission.study.model_dump(mode="json"), submission.set)
             return study_work(submission.study, submission.set)
         assert submission.scene is not None, "a submission has one of the three"
-        _limit(Kind.SCENE, override(submission.scene.model_dump(mode="json"), submission.set))
+        _limit(Kind.SCENE, submission.scene.model_dump(mode="json"), submission.set)
         return scene_work(submission.scene, submission.set)
     except ValueError as error:
         raise BadInput(str(error)) from error
@@ -72,5 +73,9 @@ def kind_of(document: dict[str, Any]) -> Kind:
     return Kind.STUDY if "search" in document else Kind.SCENE
 
 
-def _limit(kind: Kind, document: dict[str, Any]) -> None:
-    (limit_study if kind is Kind.STUDY else limit_scene)(document)
+def _limit(kind: Kind, document: dict[str, Any], changes: Mapping[str, Any]) -> None:
+    """Refuse a document that is too large with these changes."""
+    limit = limit_study if kind is Kind.STUDY else limit_scene
+    # To change the vesicles of an arrangement they have to be found places first, which takes its time.
+    limit(override(document, {path: changes[path] for path in changes if "vesicles" not in path.split(".")}))
+    limit(override(document, changes))

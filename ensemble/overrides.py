@@ -1,6 +1,7 @@
 """Changes to a scene or study by dotted path, and one-line messages about documents that are refused.
 
-``vesicles.reduced_area=0.8`` sets a field of every vesicle, ``vesicles.0.angle=1.0`` of the first one.
+``vesicles.reduced_area=0.8`` sets a field of every vesicle, ``vesicles.0.angle=1.0`` of the first one; the
+vesicles of an arrangement can be changed like listed ones.
 """
 
 from __future__ import annotations
@@ -12,8 +13,10 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
+
+from solver.scene import Arrangement
 
 Location = tuple[str | int, ...]
 
@@ -113,7 +116,7 @@ def override(document: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[st
     document : mapping
         As for `locations`.
     changes : mapping from dotted path to value
-        Applied in order.
+        Applied in order, except that an arrangement is changed before its vesicles are.
 
     Raises
     ------
@@ -121,7 +124,8 @@ def override(document: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[st
         As `locations`.
     """
     changed: dict[str, Any] = _editable(document)
-    for path, value in changes.items():
+    for path, value in sorted(changes.items(), key=lambda change: "vesicles" in change[0].split(".")):
+        _list_vesicles(changed, path)
         for location in locations(changed, path):
             *outer, last = location
             node: Any = changed
@@ -131,6 +135,22 @@ def override(document: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[st
                 node = node[key]
             node[last] = copy.deepcopy(value)
     return changed
+
+
+def _list_vesicles(document: dict[str, Any], path: str) -> None:
+    """Replace the arrangement of the scene whose vesicles a dotted path names by these vesicles."""
+    node: Any = document
+    for part in path.split("."):
+        if not isinstance(node, dict):
+            return
+        if part == "vesicles" and part not in node and node.get("arrangement") is not None:
+            arrangement = node.pop("arrangement")
+            try:
+                arranged = TypeAdapter(Arrangement).validate_python(arrangement)
+            except ValidationError as error:
+                raise ValueError(f"arrangement: {explain(error, arrangement)}") from error
+            node[part] = [vesicle.model_dump() for vesicle in arranged.vesicles()]
+        node = node.get(part)
 
 
 def _editable(node: Any) -> Any:

@@ -21,8 +21,8 @@ RESULT_PACKAGES = (DISTRIBUTION, "numpy", "scipy", "numba")
 class RunSummary(BaseModel):
     """Everything about a run except its arrays.  Its JSON is the attributes of the run's files.
 
-    Results have the names, units and None of `solver.run.Run`; `series` names the recorded diagnostics and
-    `versions` the packages that the numbers depend on.
+    Results have the names, units and None of `solver.run.Run`; `series` and `vesicle_series` name the
+    recorded diagnostics, `versions` the packages that the numbers depend on.
     """
 
     # Strings keep NaN and infinity, which a failed run may carry, inside the JSON standard.
@@ -44,6 +44,7 @@ class RunSummary(BaseModel):
     error: Errors
     work: Work
     series: tuple[str, ...]
+    vesicle_series: tuple[str, ...] = ()
 
     @property
     def wall_seconds(self) -> float:
@@ -64,14 +65,14 @@ class RunSummary(BaseModel):
             created=now(),
             versions=versions | {"python": platform.python_version()},
             series=tuple(sorted(run.series)),
+            vesicle_series=tuple(sorted(run.vesicle_series)),
             **results,
         )
 
 
+_OTHERS = ("key", "created", "versions", "series", "vesicle_series")
 # The fields of a run that its summary holds unchanged.
-RESULTS = tuple(
-    name for name in RunSummary.model_fields if name not in ("key", "created", "versions", "series")
-)
+RESULTS = tuple(name for name in RunSummary.model_fields if name not in _OTHERS)
 
 
 class NamedArray(NamedTuple):
@@ -91,16 +92,23 @@ FRAME_DIMENSIONS: Mapping[str, tuple[str, ...]] = {
 
 
 def arrays(run: Run) -> dict[str, NamedArray]:
-    """Arrays of a run by name: each diagnostic over `time`, then the frames over `frame_time`."""
+    """Arrays of a run by name: diagnostics over `time`, then the frames over `frame_time`."""
     frames = {
         "frame_time": run.frames.time,
         "tangent_angle": run.frames.tangent_angle,
         "center": run.frames.center,
         "tension": run.frames.tension,
     }
-    return {name: NamedArray(("time",), values) for name, values in run.series.items()} | {
-        name: NamedArray(FRAME_DIMENSIONS[name], values) for name, values in frames.items()
+    series = {name: NamedArray(("time",), values) for name, values in run.series.items()}
+    vesicle_series = {
+        name: NamedArray(("time", "vesicle", "axis")[: values.ndim], values)
+        for name, values in run.vesicle_series.items()
     }
+    return (
+        series
+        | vesicle_series
+        | {name: NamedArray(FRAME_DIMENSIONS[name], values) for name, values in frames.items()}
+    )
 
 
 def rebuild(summary: RunSummary, read: Callable[[str], Array]) -> Run:
@@ -108,6 +116,7 @@ def rebuild(summary: RunSummary, read: Callable[[str], Array]) -> Run:
     return Run(
         **{name: getattr(summary, name) for name in RESULTS},
         series={name: read(name) for name in summary.series},
+        vesicle_series={name: read(name) for name in summary.vesicle_series},
         frames=Frames(
             time=read("frame_time"),
             tangent_angle=read("tangent_angle"),

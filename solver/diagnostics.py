@@ -8,18 +8,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver import curve, scene
+from solver.contacts import CONTACT, cluster_sizes, clusters
 from solver.dynamics import Dynamics, Motion
 from solver.geometry import Geometry, Membranes
 from solver.orbit import Orbit
 from solver.proximity import gap, waist_error
 from solver.resolution import carried, resampled_angle, shape_tails
 from solver.rheology import adhesion_stress, membrane_stress
-from solver.run import Frames, Series
+from solver.run import Frames, Series, VesicleSeries
 from solver.spectral import resampled
 from solver.symmetry import independent_vesicles
 
 Array = NDArray[np.float64]
 Measure = Callable[[Motion], float]
+VesicleMeasure = Callable[[Motion], Array]
+
+_MANY = 3  # vesicles, from which on each of them is measured
 
 
 def areas(geometry: Geometry) -> Array:
@@ -74,6 +78,22 @@ def measures(setting: scene.Scene, dynamics: Dynamics) -> dict[str, Measure]:
     return found
 
 
+def vesicle_measures(setting: scene.Scene) -> dict[str, VesicleMeasure]:
+    """What is measured of every vesicle of a scene of many, by the name of its series."""
+    if len(setting.vesicles) < _MANY:
+        return {}
+    target_area = np.array([v.reduced_area * v.length**2 / (4 * np.pi) for v in setting.vesicles])
+    found: dict[str, VesicleMeasure] = {
+        "vesicle_center": lambda motion: motion.geometry.centers.T,
+        "vesicle_inclination_angle": lambda motion: curve.inclination(motion.geometry.points.swapaxes(0, 1)),
+        "vesicle_area_error": lambda motion: areas(motion.geometry) / target_area - 1,
+    }
+    if setting.adhesion:
+        contact = CONTACT * setting.adhesion.distance
+        found["vesicle_cluster"] = lambda motion: clusters(motion.geometry, contact)
+    return found
+
+
 class Recorder:
     """Collects diagnostics and frames."""
 
@@ -82,10 +102,12 @@ class Recorder:
         self._dynamics = dynamics
         self._orbit = orbit
         self._measures = measures(setting, dynamics)
+        self._vesicle_measures = vesicle_measures(setting)
         self._frame_interval = setting.output.frame_interval
         self._frames: list[tuple[float, Array, Array, Array]] = []
         self._previous: tuple[float, Array] | None = None
         self.values: dict[str, list[float]] = {}
+        self._vesicle_values: dict[str, list[Array]] = {}
         self.spatial_error = 0.0
 
     def continue_with(self, dynamics: Dynamics) -> None:
@@ -102,6 +124,8 @@ class Recorder:
         self._append("time", time)
         for name, measure in self._measures.items():
             self._append(name, measure(motion))
+        for name, measure_each in self._vesicle_measures.items():
+            self._vesicle_values.setdefault(name, []).append(measure_each(motion))
         if self._orbit:
             self._append("center_distance", self._orbit.distance_of(state))
             self._append("center_angle", self._orbit.angle_of(state))
@@ -153,7 +177,17 @@ class Recorder:
     @property
     def series(self) -> Series:
         """All diagnostics."""
-        return {name: np.array(values) for name, values in self.values.items()}
+        found = {name: np.array(values) for name, values in self.values.items()}
+        if "vesicle_cluster" in self._vesicle_values:
+            sizes = [cluster_sizes(labels) for labels in self._vesicle_values["vesicle_cluster"]]
+            found["clusters"] = np.array([float(len(of_sample)) for of_sample in sizes])
+            found["largest_cluster"] = np.array([float(of_sample.max()) for of_sample in sizes])
+        return found
+
+    @property
+    def vesicle_series(self) -> VesicleSeries:
+        """What was measured of every vesicle."""
+        return {name: np.array(values) for name, values in self._vesicle_values.items()}
 
     @property
     def frames(self) -> Frames:

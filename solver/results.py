@@ -31,8 +31,8 @@ def inclination(scene: Scene, series: Series) -> float | None:
     return None
 
 
-def viscosity(series: Series, outcome: Outcome, orbit: Orbit | None) -> Viscosity | None:
-    """Average over a pair's last full turn, or the value in the steady state; None while neither exists."""
+def viscosity(scene: Scene, series: Series, outcome: Outcome, orbit: Orbit | None) -> Viscosity | None:
+    """As `solver.run.Viscosity` says which average it is; None while it does not exist."""
     if "viscosity_bending_tension" not in series:
         return None
     if outcome is Outcome.STEADY:
@@ -40,16 +40,26 @@ def viscosity(series: Series, outcome: Outcome, orbit: Orbit | None) -> Viscosit
         def average(name: str) -> float:
             return float(series[name][-1])
 
-    elif orbit and orbit.period:
-        first, last = orbit.half_turns[-3], orbit.half_turns[-1]
+    else:
+        interval = _averaged_over(scene, series, orbit)
+        if interval is None:
+            return None
+        first, last = interval
 
         def average(name: str) -> float:
             return float(CubicSpline(series["time"], series[name]).integrate(first, last)) / (last - first)
 
-    else:
-        return None
     membrane = average("viscosity_bending_tension")
     if "viscosity_adhesion" not in series:
         return Viscosity(total=membrane, bending_tension=membrane, adhesion=None)
     adhesion = average("viscosity_adhesion")
     return Viscosity(total=membrane + adhesion, bending_tension=membrane, adhesion=adhesion)
+
+
+def _averaged_over(scene: Scene, series: Series, orbit: Orbit | None) -> tuple[float, float] | None:
+    """From when to when the viscosity of a run that is not steady is averaged; None while it cannot be."""
+    if orbit:
+        return (orbit.half_turns[-3], orbit.half_turns[-1]) if orbit.period else None
+    if len(scene.vesicles) == 1 or len(series["time"]) < 2:
+        return None
+    return float(series["time"][-1]) / 2, float(series["time"][-1])

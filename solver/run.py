@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 import numpy as np
@@ -28,7 +28,11 @@ class Outcome(StrEnum):
 
 @dataclass(frozen=True)
 class Viscosity:
-    """Intrinsic viscosity −∫ f_x y ds/(rate·area), averaged over time; no adhesion part without adhesion."""
+    """Intrinsic viscosity −∫ f_x y ds/(rate·area), averaged over time; no adhesion part without adhesion.
+
+    It is taken over a pair's last full turn, over the second half of a run of three or more vesicles, and
+    otherwise from the steady state.  A suspension with the area fraction φ has the viscosity 1 + φ·[μ].
+    """
 
     total: float
     bending_tension: float
@@ -82,8 +86,14 @@ class Work:
 # bending_energy, area_error, closure_error, state_rate.  With two or more vesicles: gap.  With exactly two:
 # center_distance, center_angle (of the line of centers, radians, unwrapped).  With adhesion:
 # adhesion_energy.  In shear: viscosity_bending_tension and, with adhesion, viscosity_adhesion.  With one
-# vesicle: inclination_angle (radians).
+# vesicle: inclination_angle (radians).  With three or more vesicles and adhesion: clusters (their number,
+# single vesicles included) and largest_cluster (vesicles in it); `contacts` says what a cluster is.
 Series = Mapping[str, Array]
+
+# What is measured of every vesicle where there are three or more, sampled at `Series["time"]`, by name:
+# vesicle_center (time, vesicles, 2), vesicle_inclination_angle (radians) and vesicle_area_error (relative),
+# both (time, vesicles); with adhesion vesicle_cluster, the number of its cluster, (time, vesicles).
+VesicleSeries = Mapping[str, Array]
 
 
 @dataclass(frozen=True)
@@ -120,3 +130,4 @@ class Run:
     work: Work
     series: Series
     frames: Frames
+    vesicle_series: VesicleSeries = field(default_factory=dict)

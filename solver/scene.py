@@ -6,50 +6,32 @@ viscosity 1; a length of 2π and a bending modulus of 1 are the defaults of a ve
 
 from __future__ import annotations
 
-import math
-from itertools import combinations
 from typing import Annotated, Literal, Self
 
-import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from solver.shapes import semi_axes
+from solver.arrangement import Arrangement
+from solver.ellipses import overlapping_pair
+from solver.model import Model, NonNegative, Positive
+from solver.vesicle import Vesicle
 
-Positive = Annotated[float, Field(gt=0)]
-NonNegative = Annotated[float, Field(ge=0)]
-
-
-class Model(BaseModel):
-    """Base of all configuration: immutable, refuses unknown keys, NaN and infinity."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-
-class Vesicle(Model):
-    """An inextensible membrane that starts as an ellipse of exactly this reduced area and length."""
-
-    reduced_area: float = Field(0.9, gt=0, le=1)  # 4π·area/length²
-    length: Positive = 2 * math.pi
-    bending_modulus: Positive = 1.0
-    viscosity_contrast: Positive = 1.0  # of the fluid inside to that outside
-    center: tuple[float, float] = (0.0, 0.0)
-    angle: float = math.pi / 2  # of the long axis against x, radians
-
-
-def ellipses_overlap(first: Vesicle, second: Vesicle, samples: int = 720) -> bool:
-    """Whether the starting ellipses of two vesicles touch or overlap, seen at ``samples`` points of each."""
-    return _reaches_into(first, second, samples) or _reaches_into(second, first, samples)
-
-
-def _reaches_into(first: Vesicle, second: Vesicle, samples: int) -> bool:
-    """Whether a boundary point of ``first`` lies in ``second``."""
-    alpha = np.linspace(0, 2 * np.pi, samples, endpoint=False)
-    major, minor = semi_axes(first.reduced_area, first.length)
-    axis = np.exp(1j * first.angle)
-    boundary = complex(*first.center) + axis * (major * np.cos(alpha) + 1j * minor * np.sin(alpha))
-    major, minor = semi_axes(second.reduced_area, second.length)
-    inside = (boundary - complex(*second.center)) * np.exp(-1j * second.angle)
-    return bool(np.any((inside.real / major) ** 2 + (inside.imag / minor) ** 2 <= 1))
+__all__ = [
+    "Adhesion",
+    "Arrangement",
+    "Criteria",
+    "Extension",
+    "Flow",
+    "Model",
+    "NonNegative",
+    "Numerics",
+    "Output",
+    "Positive",
+    "Scene",
+    "Shear",
+    "Start",
+    "Trap",
+    "Vesicle",
+]
 
 
 class Adhesion(Model):
@@ -158,7 +140,9 @@ class Scene(Model):
     """Everything a run depends on."""
 
     horizon: Positive
-    vesicles: tuple[Vesicle, ...] = Field(min_length=1)
+    # Instead of the vesicles, into which it is turned here: a scene that has been checked has none.
+    arrangement: Arrangement | None = Field(None, exclude=True)
+    vesicles: tuple[Vesicle, ...] = Field((), validate_default=True)
     adhesion: Adhesion | None = None
     flow: Flow | None = None
     start: Start = Start()
@@ -166,14 +150,32 @@ class Scene(Model):
     criteria: Criteria = Criteria()
     output: Output = Output()
 
+    @field_validator("vesicles")
+    @classmethod
+    def _listed_or_arranged(cls, vesicles: tuple[Vesicle, ...], info: ValidationInfo) -> tuple[Vesicle, ...]:
+        arrangement = info.data.get("arrangement")
+        if arrangement is None:
+            if not vesicles and "arrangement" in info.data:  # absent if it was refused itself
+                raise ValueError("a scene needs at least one vesicle, or an arrangement")
+            return vesicles
+        if vesicles:
+            raise ValueError("a scene has either vesicles or an arrangement, not both")
+        return tuple(arrangement.vesicles())
+
+    @model_validator(mode="after")
+    def _arranged(self) -> Self:
+        self.__dict__["arrangement"] = None  # scenes of equal vesicles are equal
+        return self
+
     @model_validator(mode="after")
     def _apart(self) -> Self:
-        for (i, first), (j, second) in combinations(enumerate(self.vesicles), 2):
-            if ellipses_overlap(first, second):
-                raise ValueError(
-                    f"vesicles {i} and {j} overlap: centers {list(first.center)} and {list(second.center)} "
-                    "must lie farther apart"
-                )
+        pair = overlapping_pair(self.vesicles)
+        if pair:
+            i, j = pair
+            raise ValueError(
+                f"vesicles {i} and {j} overlap: centers {list(self.vesicles[i].center)} and "
+                f"{list(self.vesicles[j].center)} must lie farther apart"
+            )
         return self
 
     @model_validator(mode="after")

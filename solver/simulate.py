@@ -189,7 +189,7 @@ def _summary(
         effective_aspect_ratio=results.effective_aspect_ratio(period, scene),
         inclination_angle=results.inclination(scene, series),
         gap=float(series["gap"][-1]) if "gap" in series else None,
-        viscosity=results.viscosity(series, outcome, orbit),
+        viscosity=results.viscosity(scene, series, outcome, orbit),
         energy=Energy(
             bending=float(series["bending_energy"][-1]),
             adhesion=None if adhesion_energy is None else float(adhesion_energy[-1]),
@@ -203,4 +203,5 @@ def _summary(
         work=work,
         series=series,
         frames=recorder.frames,
+        vesicle_series=recorder.vesicle_series,
     )

@@ -59,6 +59,9 @@ def _array_problems(run: Run) -> list[str]:
         return ["it has no array time"]
     samples = run.series["time"].shape[:1]
     expected |= {name: (values, samples) for name, values in run.series.items()}
+    expected |= {
+        name: (values, (*samples, vesicles, *values.shape[2:])) for name, values in run.vesicle_series.items()
+    }
     problems = []
     for name, (values, shape) in expected.items():
         if values.shape != shape:

@@ -98,6 +98,8 @@ def test_documents_that_are_none(unharmed, content):
         {"preset": "critical-hamaker", "set": {"scene": {"horizon": 1.0, "vesicles": [{}] * 20_000}}},
         {"preset": "critical-hamaker", "set": {"sweep.values": list(range(1, 20_000))}},
         {"preset": "critical-hamaker", "set": {"search.tolerance": 1e-300}},
+        {"preset": "suspension-shear", "set": {"arrangement.count": 4000, "vesicles.angle": 1.0}},
+        {"scene": {"horizon": 1, "arrangement": {"kind": "lattice", "columns": 64, "rows": 64}}},
         {"preset": "critical-hamaker", "set": {"search.limits": [5e-324, 1.7e308], "scene.horizon": 1e9}},
         {"preset": "doublet-shear", "set": {f"criteria.{number}": 1 for number in range(10_000)}},
     ],

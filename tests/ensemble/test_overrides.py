@@ -145,3 +145,26 @@ def test_an_unknown_kind_of_flow_is_told_the_known_ones() -> None:
     message = refusal({"flow.kind": "poiseuille"})
     assert message.startswith("flow: ")
     assert all(kind in message for kind in ("poiseuille", "shear", "extension", "trap"))
+
+
+SUSPENSION: dict[str, Any] = {
+    "horizon": 10.0,
+    "arrangement": {"kind": "random", "count": 5, "area_fraction": 0.2},
+}
+
+
+def test_an_arrangement_can_be_changed_and_so_can_its_vesicles() -> None:
+    changed = override(SUSPENSION, {"vesicles.bending_modulus": 2.0, "arrangement.count": 6})
+    scene = Scene.model_validate(changed)
+    assert [vesicle.bending_modulus for vesicle in scene.vesicles] == [2.0] * 6
+    kept = override(SUSPENSION, {"arrangement.seed": 3, "horizon": 5.0})
+    assert kept["arrangement"] == {**SUSPENSION["arrangement"], "seed": 3}
+    expected = [vesicle.center for vesicle in Scene.model_validate(SUSPENSION).vesicles]
+    study = override({"scene": SUSPENSION}, {"scene.vesicles.0.angle": 1.0})
+    assert [tuple(vesicle["center"]) for vesicle in study["scene"]["vesicles"]] == expected
+    assert study["scene"]["vesicles"][0]["angle"] == 1.0
+
+
+def test_vesicles_of_an_arrangement_that_cannot_be_are_refused_by_its_name() -> None:
+    with pytest.raises(ValueError, match=r"arrangement: area_fraction: 2"):
+        override(SUSPENSION, {"vesicles.angle": 1.0, "arrangement.area_fraction": 2})
