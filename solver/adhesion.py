@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from solver import scene
 from solver.adhesion_kernels import adhesion_density, adhesion_energies, adhesion_hessians
 from solver.geometry import Geometry
+from solver.parallel import SERIAL, Parallel, Shares
 from solver.proximity import Closeness
 from solver.quadrature import required_ratio, trapezoid_error
-from solver.refinement import MAXIMUM_FACTOR
+from solver.refinement import MAXIMUM_FACTOR, Refinement, sum_costs, within
 
 Array = NDArray[np.float64]
 
@@ -30,6 +31,8 @@ class Adhesion:
     parameters : scene.Adhesion
     accuracy : float
         Relative error allowed in the force between two nearly parallel membranes.
+    parallel : Parallel
+        The points that the forces act on are shared out among these ranks.
 
     Attributes
     ----------
@@ -37,7 +40,8 @@ class Adhesion:
         Distance over spacing to which sources are refined for a target.
     """
 
-    def __init__(self, parameters: scene.Adhesion, accuracy: float) -> None:
+    def __init__(self, parameters: scene.Adhesion, accuracy: float, parallel: Parallel = SERIAL) -> None:
+        self._parallel = parallel
         m, n = parameters.exponents
         self._potential = parameters.distance, m, n
         self._hamaker = parameters.hamaker
@@ -48,23 +52,32 @@ class Adhesion:
     def density(self, geometry: Geometry, closeness: Closeness) -> Array:
         """Force per length, (2, M, N)."""
         density = np.zeros_like(geometry.points)
-        adhesion_density(*self._arguments(geometry, closeness), density)
-        return density
+        shares, arguments = self._share(geometry, closeness)
+        adhesion_density(*arguments, density)
+        own = density.reshape(2, -1)[:, shares.own]
+        return shares.gather(own, axis=1).reshape(density.shape)
 
     def jacobian(self, geometry: Geometry, closeness: Closeness) -> Array:
         """Derivative of `density` by the state, (2, M·N, state)."""
         membranes = geometry.membranes
         size = membranes.count * membranes.points
         hessian = np.empty((2, size, 2, membranes.copies * size))
-        adhesion_hessians(*self._arguments(geometry, closeness), hessian)
-        return geometry.by_state(membranes.fold(hessian))
+        shares, arguments = self._share(geometry, closeness)
+        adhesion_hessians(*arguments, hessian)
+        own = hessian[:, shares.own]
+        return shares.gather(geometry.by_state(membranes.fold(own)), axis=1)
 
-    def _arguments(self, geometry: Geometry, closeness: Closeness) -> tuple[Any, ...]:
-        """What the compiled sums of forces over all pairs are given."""
-        return *self._sums(geometry, closeness), self._hamaker * self._potential[1]
-
-    def _sums(self, geometry: Geometry, closeness: Closeness) -> tuple[Any, ...]:
+    def _share(self, geometry: Geometry, closeness: Closeness) -> tuple[Shares, tuple[Any, ...]]:
+        """Which points are this rank's, and what the compiled sums of forces on them are given."""
         refinement = closeness.refinement(self.ratio)
+        size = geometry.membranes.count * geometry.membranes.points
+        shares = self._parallel.divide(
+            size, lambda: sum_costs(refinement, refinement.groups[:, 2].astype(float), size)
+        )
+        sums = self._sums(geometry, within(refinement, shares.own, size))
+        return shares, (*sums, self._hamaker * self._potential[1])
+
+    def _sums(self, geometry: Geometry, refinement: Refinement) -> tuple[Any, ...]:
         return geometry.curve_points, geometry.membranes.curve_spacing, refinement, *self._potential
 
     def sum_error(self, closeness: Closeness) -> float:
@@ -73,5 +86,5 @@ class Adhesion:
 
     def energy(self, geometry: Geometry, closeness: Closeness) -> float:
         """∫∫ φ ds ds summed over all pairs."""
-        energy = adhesion_energies(*self._sums(geometry, closeness))
+        energy = adhesion_energies(*self._sums(geometry, closeness.refinement(self.ratio)))
         return float(geometry.membranes.copies * self._hamaker * energy)

@@ -254,10 +254,12 @@ def close_single_layer(
     correction: Array,
     differentiation: Array,
     components: Array,
+    first: int,
 ) -> None:
     """Replace the rows of components (3, ·, C·n) for targets too close for `refinement.refine_single_layer`.
 
-    points, tangents : (2, C, n); spacing : (C,); the rest as in `close_stokeslets`
+    points, tangents : (2, C, n); spacing : (C,); ``first`` as in `refinement.refine_single_layer`; the rest
+    as in `close_stokeslets`
     """
     n = points.shape[2]
     for g in range(refinement.groups.shape[0]):
@@ -276,4 +278,4 @@ def close_single_layer(
             close,
         )
         for k in range(rows.size):
-            components[:, target * n + rows[k], source * n : (source + 1) * n] = close[:, k]
+            components[:, target * n + rows[k] - first, source * n : (source + 1) * n] = close[:, k]

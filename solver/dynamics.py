@@ -20,6 +20,7 @@ from solver.bending import Bending
 from solver.flow import ImposedFlow, imposed_flow
 from solver.geometry import Geometry, Membranes
 from solver.gliding import glide, gliding_direction, gliding_speed, gliding_speed_by_curvature
+from solver.parallel import SERIAL, Parallel
 from solver.proximity import Closeness
 from solver.scene import Numerics, Scene
 from solver.spectral import differentiation, highest_modes, integration
@@ -52,6 +53,14 @@ class Motion:
     adhesion: Array | None
 
 
+def state_change(motion: Motion) -> Array:
+    """How a state changes whose motion this is, (state_size,); see `Dynamics.rate`."""
+    turning = motion.turning.copy()
+    points = turning.shape[1]
+    glide(motion.geometry.curvature, turning, highest_modes(points))
+    return np.concatenate([turning.ravel(), motion.velocity.sum(axis=2).ravel() / points])
+
+
 @dataclass
 class Dynamics:
     """Right-hand side and Jacobian of the equation of motion.
@@ -68,18 +77,18 @@ class Dynamics:
     evaluations: int = field(default=0, init=False)
 
     @classmethod
-    def of(cls, scene: Scene) -> Self:
-        """The terms of a scene."""
+    def of(cls, scene: Scene, parallel: Parallel = SERIAL) -> Self:
+        """The terms of a scene, computed together by these ranks."""
         membranes = Membranes.of_scene(scene)
         several = membranes.curves > 1
         accuracy = accuracy_of(scene.numerics)
         return cls(
             membranes=membranes,
             bending=Bending(),
-            adhesion=Adhesion(scene.adhesion, accuracy) if scene.adhesion and several else None,
+            adhesion=Adhesion(scene.adhesion, accuracy, parallel) if scene.adhesion and several else None,
             flow=imposed_flow(scene.flow, membranes) if scene.flow else None,
             inextensibility=Inextensibility(accuracy, 1e-3 * accuracy if several else ROUND_OFF),
-            layer=SingleLayer(membranes, accuracy),
+            layer=SingleLayer(membranes, accuracy, parallel),
         )
 
     def motion(self, state: Array) -> Motion:
@@ -108,9 +117,7 @@ class Dynamics:
 
     def rate_of(self, motion: Motion) -> Array:
         """`rate` in the state of a motion."""
-        turning = motion.turning.copy()
-        glide(motion.geometry.curvature, turning, highest_modes(self.membranes.points))
-        return np.concatenate([turning.ravel(), motion.velocity.sum(axis=2).ravel() / self.membranes.points])
+        return state_change(motion)
 
     def jacobian(self, state: Array) -> Array:
         """Derivative of `rate`, (state_size, state_size).
@@ -119,16 +126,30 @@ class Dynamics:
         """
         motion = self.motion(state)
         geometry = motion.geometry
+        adhesion = flow = None
+        if self.adhesion and motion.closeness:
+            adhesion = self.adhesion.jacobian(geometry, motion.closeness)
+        if self.flow:
+            flow = self.flow.jacobian(self.point_derivatives(geometry))
+        return self.linearized(motion, adhesion, flow)
+
+    def linearized(self, motion: Motion, adhesion: Array | None, flow: Array | None) -> Array:
+        """`jacobian` in the state of a motion, whose geometry was the last one assembled.
+
+        ``adhesion`` and ``flow``, (2, M·N, state), are the derivatives of these by the state, where there are
+        such terms.
+        """
+        geometry = motion.geometry
         force = self.bending.jacobian(geometry)
         self._add_tension_turning(motion, force)
-        if self.adhesion and motion.closeness:
-            force += self.adhesion.jacobian(geometry, motion.closeness)
+        if adhesion is not None:
+            force += adhesion
         weights = np.repeat(self.membranes.spacing, self.membranes.points)[:, None]
         force *= weights
         velocity = self.layer.columns(force)
         velocity += self.layer.jacobian(geometry, self._point_forces(motion))
-        if self.flow:
-            velocity += self.flow.jacobian(self._point_derivatives(geometry))
+        if flow is not None:
+            velocity += flow
         stretching = self.inextensibility.stretching(geometry, velocity)
         every_point = np.arange(motion.turning.size)
         stretching[every_point, every_point] += motion.turning.ravel()
@@ -163,7 +184,7 @@ class Dynamics:
         self.layer.assemble(geometry, closeness)
         return geometry, closeness
 
-    def _point_derivatives(self, geometry: Geometry) -> Array:
+    def point_derivatives(self, geometry: Geometry) -> Array:
         """Derivatives of the points by the state, (2, M·N, state)."""
         count, points = self.membranes.count, self.membranes.points
         by_state = np.zeros((2, count * points, self.membranes.state_size))

@@ -38,7 +38,9 @@ def stokeslets(targets: Array, sources: Array, components: Array) -> None:
 
 
 @compiled
-def complete_self_parts(correction: Array, diagonal: Array, tangents: Array, components: Array) -> None:
+def complete_self_parts(
+    correction: Array, diagonal: Array, tangents: Array, components: Array, begin: int
+) -> None:
     """Turn point Stokeslets of closed curves on themselves into their single-layer quadrature.
 
     Parameters
@@ -48,23 +50,23 @@ def complete_self_parts(correction: Array, diagonal: Array, tangents: Array, com
     diagonal : (M,)
         The whole logarithmic part on the diagonal, over 4π.
     tangents : (2, M, n)
-    components : (3, M·n, ·)
-        Of `stokeslets`; the sources begin with the targets.
+    components : (3, m, ·)
+        Of `stokeslets` at m points from ``begin`` on; the sources begin with all M·n points.
     """
     scale = 1.0 / (4.0 * np.pi)
     n = tangents.shape[2]
-    for vesicle in range(tangents.shape[1]):
+    for row in range(components.shape[1]):
+        point = begin + row
+        vesicle, i = point // n, point % n
         first = vesicle * n
-        for i in range(n):
-            row = first + i
-            for j in range(n):
-                components[0, row, first + j] += correction[i, j]
-            for j in range(n):
-                components[2, row, first + j] += correction[i, j]
-            tx, ty = tangents[0, vesicle, i], tangents[1, vesicle, i]
-            components[0, row, row] = diagonal[vesicle] + scale * tx * tx
-            components[1, row, row] = scale * tx * ty
-            components[2, row, row] = diagonal[vesicle] + scale * ty * ty
+        for j in range(n):
+            components[0, row, first + j] += correction[i, j]
+        for j in range(n):
+            components[2, row, first + j] += correction[i, j]
+        tx, ty = tangents[0, vesicle, i], tangents[1, vesicle, i]
+        components[0, row, point] = diagonal[vesicle] + scale * tx * tx
+        components[1, row, point] = scale * tx * ty
+        components[2, row, point] = diagonal[vesicle] + scale * ty * ty
 
 
 @compiled
@@ -84,16 +86,17 @@ def join_components(components: Array, matrix: Array) -> None:
 
 
 @compiled
-def stokeslet_derivatives(points: Array, forces: Array, by_points: Array) -> None:
-    """Fill the derivatives (2, m, 2, n) of the velocity at the first m of ``points`` (2, n) by all of them.
+def stokeslet_derivatives(points: Array, forces: Array, by_points: Array, first: int) -> None:
+    """Fill the derivatives (2, m, 2, n) of the velocity at m of ``points`` (2, n) by all of them.
 
-    The velocity is the sum of Stokeslets of strength ``forces`` (2, n) at the points; with r = x − y and
+    The m points are those from ``first`` on.  The velocity is the sum of Stokeslets of strength ``forces``
+    (2, n) at the points; with r = x − y and
     g = F·r, moving r by δ changes one of them by
     [−F (r·δ) + r (F·δ) + g δ − 2 g r (r·δ)/r²]/(4π r²).
     """
     scale = 1.0 / (4.0 * np.pi)
     for i in range(by_points.shape[1]):
-        xi, yi = points[0, i], points[1, i]
+        xi, yi = points[0, first + i], points[1, first + i]
         for j in range(points.shape[1]):
             dx = xi - points[0, j]
             dy = yi - points[1, j]
@@ -108,7 +111,7 @@ def stokeslet_derivatives(points: Array, forces: Array, by_points: Array) -> Non
             by_points[1, i, 1, j] = -along * inverse + pull * dy * dy
         for component in range(2):
             for coordinate in range(2):
-                by_points[component, i, coordinate, i] -= by_points[component, i, coordinate].sum()
+                by_points[component, i, coordinate, first + i] -= by_points[component, i, coordinate].sum()
 
 
 @compiled

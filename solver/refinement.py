@@ -81,6 +81,28 @@ def group_targets(distances: Array, ratio: float) -> tuple[Indices, Indices, Ind
     return table, rows, np.array(starts)
 
 
+def within(refinement: Refinement, own: slice, size: int) -> Refinement:
+    """The part of a refinement that concerns the points ``own`` of all ``size``."""
+    if own == slice(0, size):
+        return refinement
+    sizes = np.diff(refinement.starts)
+    group = np.repeat(np.arange(sizes.size), sizes)
+    rows = refinement.rows[: group.size]
+    point = refinement.groups[group, 0] * refinement.interpolations.shape[1] + rows
+    inside = (own.start <= point) & (point < own.stop)
+    sizes = np.bincount(group[inside], minlength=sizes.size)
+    starts = np.concatenate([[0], np.cumsum(sizes[sizes > 0])])
+    return Refinement(refinement.groups[sizes > 0], rows[inside], starts, refinement.interpolations)
+
+
+def sum_costs(refinement: Refinement, costs: Array, size: int) -> Array:
+    """Sum for each of ``size`` points the costs (k,) of being in each group, (size,)."""
+    sizes = np.diff(refinement.starts)
+    group = np.repeat(np.arange(sizes.size), sizes)
+    point = refinement.groups[group, 0] * refinement.interpolations.shape[1] + refinement.rows[: group.size]
+    return np.bincount(point, weights=costs[group], minlength=size).astype(np.float64)
+
+
 @compiled
 def interpolation_to(refinement: Refinement, factor: int) -> Array:
     """The interpolation matrix (factor·n, n) for a factor of at least 2."""
@@ -96,10 +118,11 @@ def refined_points(points: Array, source: int, factor: int, refinement: Refineme
 
 
 @compiled
-def refine_single_layer(points: Array, refinement: Refinement, components: Array) -> None:
+def refine_single_layer(points: Array, refinement: Refinement, components: Array, first: int) -> None:
     """Replace the rows of components (3, ·, C·n) for targets that need a factor of 2 or 4.
 
-    Refined columns are folded back.  For closer targets `close_evaluation` costs less.
+    The rows begin with the point ``first``.  Refined columns are folded back.  For closer targets
+    `close_evaluation` costs less.
     """
     n = points.shape[2]
     for g in range(refinement.groups.shape[0]):
@@ -113,5 +136,5 @@ def refine_single_layer(points: Array, refinement: Refinement, components: Array
         for component in range(3):
             folded = np.dot(refined[component], interpolation_to(refinement, factor))
             for k in range(rows.size):
-                row = target * n + rows[k]
+                row = target * n + rows[k] - first
                 components[component, row, source * n : (source + 1) * n] = folded[k] / factor

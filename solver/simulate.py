@@ -15,6 +15,7 @@ from solver.geometry import Membranes
 from solver.integrators import StepFailedError
 from solver.orbit import Orbit
 from solver.outcome import History, criteria_of, latest_time
+from solver.parallel import SERIAL, Parallel, first_rank_asks
 from solver.resolution import UnresolvedError, carried, resolution_of, with_points
 from solver.run import LARGEST_SPATIAL, Energy, Errors, Outcome, Run, Work
 from solver.scene import Scene, Shear, Start
@@ -44,18 +45,23 @@ class _Progress:
 def simulate(
     scene: Scene,
     *,
+    parallel: Parallel = SERIAL,
     should_stop: Callable[[], bool] | None = None,
     on_progress: Callable[[float, float], None] | None = None,
 ) -> Run:
     """Run a scene until its outcome is decided.
 
+    Collective: all ranks of ``parallel`` call it with the same scene and return the same run.
+
     Parameters
     ----------
     scene : Scene
+    parallel : Parallel
+        The ranks that compute the run together.
     should_stop : callable, optional
-        Asked after every step; `Cancelled` is raised once it returns true.
+        Asked after every step, on the first rank alone; `Cancelled` is raised on all once it returns true.
     on_progress : callable, optional
-        Told the time reached and the latest time after every step.
+        Told the time reached and the latest time after every step, on each rank that gives one.
 
     Returns
     -------
@@ -64,9 +70,10 @@ def simulate(
     """
     began = clock.perf_counter()
     resolution = resolution_of(scene)
-    start = _start(scene, resolution.points, should_stop)
+    start = _start(scene, resolution.points, parallel, should_stop)
+    should_stop = first_rank_asks(parallel, should_stop)
     latest = latest_time(scene)
-    stage = Stage(with_points(scene, start.points), Cost())
+    stage = Stage(with_points(scene, start.points), Cost(), parallel)
     orbit = None
     if len(scene.vesicles) == 2:
         orbit = Orbit(stage.membranes, start.state, scene.criteria.separated_distance)
@@ -83,7 +90,7 @@ def simulate(
             step = stage.step()
             points = resolution.finer(stage.membranes, step.end, step.state)
             if points is not None:
-                coarse, stage = stage.membranes, Stage(with_points(scene, points), stage.cost)
+                coarse, stage = stage.membranes, Stage(with_points(scene, points), stage.cost, parallel)
                 progress.state = carried(coarse, progress.state, stage.membranes)
                 progress.rejected += 1
                 recorder.continue_with(stage.dynamics)
@@ -139,13 +146,13 @@ class _Start:
     failure: str | None = None
 
 
-def _start(scene: Scene, points: int, should_stop: Callable[[], bool] | None) -> _Start:
+def _start(scene: Scene, points: int, parallel: Parallel, should_stop: Callable[[], bool] | None) -> _Start:
     """Where a run begins that needs these points for the vesicles as they are placed."""
     placed = placed_state(with_points(scene, points))
     if not scene.start.relaxed:
         return _Start(points, placed)
     at_rest = scene.model_copy(update={"flow": None, "start": Start(), "horizon": scene.start.horizon})
-    relaxed = simulate(at_rest, should_stop=should_stop)
+    relaxed = simulate(at_rest, parallel=parallel, should_stop=should_stop)
     if relaxed.outcome is not Outcome.EQUILIBRIUM:
         reason = relaxed.failure or f"{relaxed.outcome} at time {relaxed.time:g}"
         evaluations = relaxed.work.rhs_evaluations

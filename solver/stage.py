@@ -11,6 +11,7 @@ from solver.diagnostics import conserved_quantities
 from solver.dynamics import Dynamics
 from solver.geometry import Geometry, Membranes
 from solver.integrators import Integrator, Step, integrator_for
+from solver.parallel import Parallel
 from solver.scene import Scene
 
 Array = NDArray[np.float64]
@@ -33,10 +34,12 @@ class Stage:
         With that number.
     before : Cost
         Of the parts before this one.
+    parallel : Parallel
+        The ranks that compute it together.
     """
 
-    def __init__(self, scene: Scene, before: Cost) -> None:
-        self.dynamics = Dynamics.of(scene)
+    def __init__(self, scene: Scene, before: Cost, parallel: Parallel) -> None:
+        self.dynamics = Dynamics.of(scene, parallel)
         self._scene = scene
         self._before = before
         self._integrator: Integrator | None = None

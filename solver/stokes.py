@@ -15,12 +15,24 @@ from numpy.typing import NDArray
 from solver import kernels
 from solver.close_evaluation import close_single_layer, logarithm_correction
 from solver.geometry import Geometry, Membranes
+from solver.parallel import SERIAL, Parallel
 from solver.proximity import Closeness
 from solver.quadrature import required_ratio
-from solver.refinement import LARGEST_REFINED, refine_single_layer
+from solver.refinement import LARGEST_REFINED, Refinement, refine_single_layer, sum_costs, within
 from solver.spectral import differentiation
 
 Array = NDArray[np.float64]
+
+# What one close target costs more than a far one, in Stokeslets a point of its source; measured.
+_CLOSE_COST = 24.0
+
+
+def row_costs(refinement: Refinement, size: int) -> Array:
+    """Costs (size,) of the points' rows beyond those of far targets, in Stokeslets."""
+    factors = refinement.groups[:, 2]
+    points = refinement.interpolations.shape[1]
+    each = np.where(factors > LARGEST_REFINED, _CLOSE_COST, np.where(factors > 1, 2.0 * factors, 0.0))
+    return sum_costs(refinement, each * points, size)
 
 
 class SingleLayer:
@@ -34,6 +46,8 @@ class SingleLayer:
     membranes : Membranes
     accuracy : float
         Relative error allowed in the velocity that one vesicle causes on another.
+    parallel : Parallel
+        The rows are shared out among these ranks.
 
     Attributes
     ----------
@@ -42,11 +56,12 @@ class SingleLayer:
         `assemble`.
     """
 
-    def __init__(self, membranes: Membranes, accuracy: float) -> None:
+    def __init__(self, membranes: Membranes, accuracy: float, parallel: Parallel = SERIAL) -> None:
         self._ratio = required_ratio(1.0, accuracy)
         points = membranes.points
         size = membranes.count * points
-        self._components = np.zeros((3, size, membranes.copies * size))
+        self._parallel = parallel
+        self._buffer = np.zeros(3 * size * membranes.copies * size)
         self.matrix = np.zeros((2 * size, 2 * size))
         self._correction = logarithm_correction(points)
         self._diagonal = self._correction[0, 0] - np.log(membranes.length / (2 * np.pi)) / (4 * np.pi)
@@ -54,14 +69,27 @@ class SingleLayer:
     def assemble(self, geometry: Geometry, closeness: Closeness | None) -> None:
         """Fill the matrix for this geometry; ``closeness`` is None for a single curve."""
         membranes = geometry.membranes
+        size, sources = membranes.count * membranes.points, membranes.curves * membranes.points
+        refinement = closeness.refinement(self._ratio) if closeness else None
+
+        def costs() -> Array:
+            return sources + (row_costs(refinement, size) if refinement else np.zeros(size))
+
+        shares = self._parallel.divide(size, costs)
+        own, rows = shares.own, shares.own.stop - shares.own.start
+        components = self._buffer[: 3 * rows * sources].reshape(3, rows, sources)
         kernels.stokeslets(
-            geometry.points.reshape(2, -1), geometry.curve_points.reshape(2, -1), self._components
+            np.ascontiguousarray(geometry.points.reshape(2, -1)[:, own]),
+            geometry.curve_points.reshape(2, -1),
+            components,
         )
-        kernels.complete_self_parts(self._correction, self._diagonal, geometry.tangents, self._components)
-        if closeness:
-            refinement = closeness.refinement(self._ratio)
-            refine_single_layer(geometry.curve_points, refinement, self._components)
-            if refinement.groups[:, 2].max() > LARGEST_REFINED:
+        kernels.complete_self_parts(
+            self._correction, self._diagonal, geometry.tangents, components, own.start
+        )
+        if refinement:
+            refinement = within(refinement, own, size)
+            refine_single_layer(geometry.curve_points, refinement, components, own.start)
+            if refinement.groups[:, 2].max(initial=1) > LARGEST_REFINED:
                 close_single_layer(
                     geometry.curve_points,
                     geometry.curve_tangents,
@@ -69,9 +97,10 @@ class SingleLayer:
                     refinement,
                     self._correction,
                     differentiation(membranes.points),
-                    self._components,
+                    components,
+                    own.start,
                 )
-        kernels.join_components(self._components, self.matrix)
+        kernels.join_components(shares.gather(components, axis=1), self.matrix)
 
     def velocity(self, point_forces: Array) -> Array:
         """Velocity (2, M, N) that point forces (2, M, N) cause at the membranes' points."""
@@ -89,10 +118,14 @@ class SingleLayer:
         """
         membranes = geometry.membranes
         size = membranes.count * membranes.points
-        by_points = np.empty((2, size, 2, membranes.copies * size))
+        shares = self._parallel.divide(size)
+        own = shares.own
+        by_points = np.empty((2, own.stop - own.start, 2, membranes.copies * size))
         curve_forces = membranes.with_images(point_forces, axis=1).reshape(2, -1)
-        kernels.stokeslet_derivatives(geometry.curve_points.reshape(2, -1), curve_forces, by_points)
-        by_state = geometry.by_state(membranes.fold(by_points))
+        kernels.stokeslet_derivatives(
+            geometry.curve_points.reshape(2, -1), curve_forces, by_points, own.start
+        )
+        by_state = shares.gather(geometry.by_state(membranes.fold(by_points)), axis=1)
         forces = point_forces.reshape(2, -1)
         # On the diagonal r⊗r/r² is t⊗t, which turns with the tangent.
         tangents, normals = geometry.tangents.reshape(2, -1), geometry.normals.reshape(2, -1)

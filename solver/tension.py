@@ -120,14 +120,20 @@ class Inextensibility:
         How much a constant tension stretches a membrane, relative to a varying one.  On a circle such a
         tension is a pressure that moves nothing: it must not be divided by round-off, nor by the error of
         the sums over other membranes.  A vesicle whose ellipticity squared is below this gives way.
+
+    Attributes
+    ----------
+    inverse, shift
+        Of A, (M·N, M·N), as `factorize` last made it, and what times the mean tension of a vesicle is added
+        to it.
     """
 
     def __init__(self, tolerance: float, elasticity: float) -> None:
         self.tolerance = tolerance
         self.iterations = 0
         self._elasticity = elasticity
-        self._inverse: Array | None = None
-        self._shift = 0.0
+        self.inverse: Array | None = None
+        self.shift = 0.0
 
     def solve(self, layer: SingleLayer, geometry: Geometry, imposed: Array) -> Inextensible:
         """The motion when all forces but the tension, and the flow, cause the velocity ``imposed`` (2, M, N).
@@ -137,7 +143,7 @@ class Inextensibility:
         TensionNotFoundError
             If the iteration does not converge even with an inverse of this very geometry.
         """
-        for inverse, limit in ((self._inverse, 25), (None, 200)):
+        for inverse, limit in ((self.inverse, 25), (None, 200)):
             if inverse is None:
                 self.factorize(layer, geometry)
             membranes = geometry.membranes
@@ -150,8 +156,8 @@ class Inextensibility:
                 differentiation(membranes.points).T,
                 membranes.wavenumber,
                 membranes.spacing[:, None],
-                self._inverse,
-                self._shift,
+                self.inverse,
+                self.shift,
                 self.tolerance,
                 membranes.natural_rate,
                 limit,
@@ -182,10 +188,10 @@ class Inextensibility:
         system = self.stretching(geometry, flow)
         system *= -np.repeat(membranes.spacing, points)[:, None]
         typical = np.trace(system) / (count * points)
-        self._shift = self._elasticity * typical
+        self.shift = self._elasticity * typical
         # Differentiation loses the highest mode, whose tension gets the weight of its neighbors.
         alternating = np.where(np.arange(points) % 2 == 0, 1.0, -1.0)
-        added = (self._shift + typical * np.outer(alternating, alternating)) / points
+        added = (self.shift + typical * np.outer(alternating, alternating)) / points
         for vesicle in range(count):
             block = slice(vesicle * points, (vesicle + 1) * points)
             system[block, block] += added
@@ -196,8 +202,8 @@ class Inextensibility:
         triangle, _ = lapack.dpotri(factor, lower=0, overwrite_c=1)
         inverse = np.triu(triangle)
         inverse += np.triu(triangle, 1).T
-        self._inverse = np.ascontiguousarray(inverse)
-        return self._inverse, flow
+        self.inverse = np.ascontiguousarray(inverse)
+        return self.inverse, flow
 
     @staticmethod
     def stretching(geometry: Geometry, velocity: Array) -> Array:

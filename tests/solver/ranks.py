@@ -1,0 +1,61 @@
+"""What `test_parallel` runs under a launcher: the same computations on however many ranks, saved by each."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ensemble.mpi import abort_guard, world
+from solver.dynamics import Dynamics
+from solver.parallel import SERIAL, Parallel, Ranks
+from solver.run import Run
+from solver.scene import Numerics, Scene, Shear, Trap, Vesicle
+from solver.simulate import simulate
+from solver.start import placed_state
+from tests.solver.scenes import shear_pair, uneven_pair
+
+Array = NDArray[np.float64]
+
+# A vesicle alone; two alike, of which one is computed; two that differ, so close that the sums are refined.
+SCENES = {
+    "one": Scene(horizon=1.0, vesicles=(Vesicle(),), flow=Shear(rate=0.5)),
+    "pair": shear_pair(1.5),
+    "close": uneven_pair(
+        flow=Trap(rate=0.3),
+        vesicles=(Vesicle(center=(-0.8, 0.0)), Vesicle(length=5.0, center=(0.6, 0.0), angle=1.4)),
+    ),
+}
+DOUBLET = shear_pair(3.5, numerics=Numerics(points=32, tolerance=1e-3))
+
+
+def linearized(scene: Scene, parallel: Parallel) -> tuple[Array, Array]:
+    """Right-hand side and Jacobian where a scene begins."""
+    dynamics, state = Dynamics.of(scene, parallel), placed_state(scene)
+    return dynamics.rate(state), dynamics.jacobian(state)
+
+
+def summary(run: Run) -> Array:
+    """What a run says, and the states that it recorded, as numbers."""
+    said = [run.period or 0.0, run.time, *run.energy.__dict__.values(), run.work.steps]
+    return np.concatenate(
+        [said, *(values.ravel() for values in (run.frames.center, run.frames.tangent_angle))]
+    )
+
+
+def computed(parallel: Parallel) -> dict[str, Array]:
+    """Everything that is compared."""
+    found = {}
+    for name, scene in SCENES.items():
+        found[f"{name} rate"], found[f"{name} jacobian"] = linearized(scene, parallel)
+    found["doublet"] = summary(simulate(DOUBLET, parallel=parallel))
+    return found
+
+
+if __name__ == "__main__":
+    communicator = world()
+    with abort_guard(communicator):
+        ranks = Ranks(communicator)
+        np.savez(Path(sys.argv[1]) / f"{ranks.rank}.npz", **computed(ranks if ranks.size > 1 else SERIAL))

@@ -1,0 +1,131 @@
+"""Ranks that compute one run together: the results of one rank, to round-off, and no hanging."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from solver.outcome import Outcome
+from solver.parallel import SERIAL, even_bounds
+from solver.simulate import simulate
+from tests.solver.ranks import DOUBLET, computed
+
+Array = NDArray[np.float64]
+
+
+@given(
+    cost=st.lists(st.floats(0.1, 100.0), min_size=1, max_size=40).map(np.array),
+    size=st.integers(1, 9),
+)
+def test_shares_are_neighbors_and_even(cost: Array, size: int) -> None:
+    bounds = even_bounds(cost, size)
+    assert bounds[0] == 0
+    assert bounds[-1] == cost.size
+    assert np.all(np.diff(bounds) >= 0)
+    shares = [cost[first:last].sum() for first, last in pairwise(bounds)]
+    assert max(shares) <= cost.sum() / size + cost.max() * (1 + 1e-12)
+
+
+def test_costly_rows_make_a_share_smaller() -> None:
+    assert even_bounds(np.array([4.0, 1.0, 1.0, 1.0, 1.0]), 2).tolist() == [0, 1, 5]
+
+
+@pytest.fixture(scope="module")
+def serial() -> dict[str, Array]:
+    return computed(SERIAL)
+
+
+@pytest.mark.parametrize("ranks", [1, 2, 3, 4])
+def test_any_number_of_ranks_computes_the_same(
+    launcher: Any, serial: dict[str, Array], ranks: int, tmp_path: Path
+) -> None:
+    """More ranks than vesicles, and shares that are uneven, are among them."""
+    result = launcher.run(ranks, [sys.executable, "-m", "tests.solver.ranks", str(tmp_path)])
+    assert result.returncode == 0, result.stderr
+    saved = [np.load(tmp_path / f"{rank}.npz") for rank in range(ranks)]
+    for name, expected in serial.items():
+        for rank in range(ranks):
+            np.testing.assert_array_equal(saved[rank][name], saved[0][name], err_msg=f"{name}, rank {rank}")
+        tolerance = (1e-6 if name == "doublet" else 1e-13) * np.max(np.abs(expected))
+        np.testing.assert_allclose(saved[0][name], expected, rtol=0, atol=tolerance, err_msg=name)
+
+
+def test_the_doublet_that_is_compared_is_bound(serial: dict[str, Array]) -> None:
+    run = simulate(DOUBLET)
+    assert run.outcome is Outcome.BOUND
+    assert serial["doublet"][0] == run.period
+
+
+MORE_RANKS_THAN_ROWS = """
+import numpy as np
+from ensemble.mpi import abort_guard, world
+from solver.parallel import Ranks
+communicator = world()
+with abort_guard(communicator):
+    shares = Ranks(communicator).divide(2)
+    part = 10.0 * np.arange(2)[None, shares.own] + np.zeros((3, 1))
+    assert np.array_equal(shares.gather(part, axis=1), [[0.0, 10.0]] * 3)
+print("right", end=" ")
+"""
+
+FAILING = """
+import sys
+from itertools import pairwise
+from ensemble.mpi import abort_guard, world
+from solver.parallel import Ranks
+from solver.simulate import simulate
+from tests.solver.ranks import DOUBLET
+communicator = world()
+with abort_guard(communicator):
+    def progress(time, latest):
+        if communicator.Get_rank() == 1:
+            raise ValueError("this rank broke")
+    simulate(DOUBLET, parallel=Ranks(communicator), on_progress=progress)
+"""
+
+CANCELLED = """
+from ensemble.mpi import abort_guard, world
+from solver.parallel import Ranks
+from solver.simulate import Cancelled, simulate
+from tests.solver.ranks import DOUBLET
+communicator = world()
+with abort_guard(communicator):
+    asked = []
+    def stop():
+        asked.append(1)
+        return len(asked) == 3
+    try:
+        simulate(DOUBLET, parallel=Ranks(communicator), should_stop=stop)
+    except Cancelled:
+        print(f" cancelled {len(asked)} ", end="")
+"""
+
+
+def run(launcher: Any, ranks: int, code: str) -> subprocess.CompletedProcess[str]:
+    completed: subprocess.CompletedProcess[str] = launcher.run(ranks, [sys.executable, "-c", code])
+    return completed
+
+
+def test_more_ranks_than_rows(launcher: Any) -> None:
+    result = run(launcher, 4, MORE_RANKS_THAN_ROWS)
+    assert result.stdout.split() == ["right"] * 4, result.stderr
+
+
+def test_an_exception_on_one_rank_of_a_run_ends_the_job(launcher: Any) -> None:
+    result = run(launcher, 2, FAILING)
+    assert result.returncode == 1
+    assert "this rank broke" in result.stderr
+
+
+def test_the_first_rank_alone_is_asked_whether_to_stop_and_stops_all(launcher: Any) -> None:
+    result = run(launcher, 2, CANCELLED)
+    assert sorted(result.stdout.split()) == ["0", "3", "cancelled", "cancelled"], result.stderr
