@@ -59,9 +59,8 @@ def contacts(measured: Mapping[float, Contact], distance: float) -> Figure:
     for axes, (area, contact) in zip(panels, measured.items(), strict=True):
         for side in (-1, 1):
             places = np.stack([side * contact.gap / 2, contact.along], axis=1)
-            lines = LineCollection(
-                list(np.stack([places[:-1], places[1:]], axis=1)), cmap="RdBu_r", norm=scale, linewidths=2.4, capstyle="round"
-            )
+            ends = np.stack([places[:-1], places[1:]], axis=1)
+            lines = LineCollection(list(ends), cmap="RdBu_r", norm=scale, linewidths=2.4, capstyle="round")
             lines.set_array((contact.pull[:-1] + contact.pull[1:]) / 2)
             axes.add_collection(lines)
             axes.axvline(side * distance / 2, color=GRAY, linewidth=0.7, linestyle="--")
