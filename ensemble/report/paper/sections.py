@@ -5,10 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from ensemble.report.paper import doublets, draining, extension
+from ensemble.report.paper import doublets, draining, extension, trap
 from ensemble.report.paper.section import Section
 
-SECTIONS: Final[tuple[Section, ...]] = (draining.SECTION, doublets.SECTION, extension.SECTION)
+SECTIONS: Final[tuple[Section, ...]] = (
+    draining.SECTION,
+    doublets.SECTION,
+    extension.SECTION,
+    trap.SECTION,
+)
 
 
 def chosen(names: Sequence[str]) -> tuple[Section, ...]:
