@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotSpec
 from scipy.interpolate import Akima1DInterpolator
 
-from ensemble.figures.membranes import extension, finite_frames, membrane_segments, tension_scale
+from ensemble.figures.membranes import FEW, extension, finite_frames, membrane_segments, tension_scale
 from ensemble.figures.output import appearing
 from ensemble.figures.panels import PANELS
 from ensemble.figures.style import GRAY, INSIDE, STYLE, TENSION_COLORS, VERMILLION
@@ -170,7 +170,11 @@ class Picture:
         self._time = axes.text(0.0, 1.0, "", transform=axes.transAxes, va="top")
         self._inside = PolyCollection([], facecolor=INSIDE)
         self.membranes = LineCollection(
-            [], cmap=TENSION_COLORS, norm=tension_scale(tension), linewidths=2.0, capstyle="round"
+            [],
+            cmap=TENSION_COLORS,
+            norm=tension_scale(tension),
+            linewidths=2.0 if len(self._scene.vesicles) <= FEW else 1.0,
+            capstyle="round",
         )
         axes.add_collection(self._inside, autolim=False)
         axes.add_collection(self.membranes, autolim=False)

@@ -47,6 +47,8 @@ GRAY: Final = "#8C8C8C"
 PALE: Final = "#F4F4F4"
 INSIDE: Final = "#EAF3F9"  # of a vesicle
 
+CLUSTER_COLORS: Final = (BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILLION)
+
 # The pale end of plasma is cut off: a thin membrane drawn in it would vanish on white.
 TENSION_COLORS: Final = ListedColormap(
     matplotlib.colormaps["plasma"](np.linspace(0, 0.86, 256)), "tension"
