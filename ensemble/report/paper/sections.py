@@ -5,10 +5,24 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from ensemble.report.paper import draining
+from ensemble.report.paper import (
+    critical_hamaker,
+    draining,
+    exponents,
+    shear,
+    unequal,
+    viscosity,
+)
 from ensemble.report.paper.section import Section
 
-SECTIONS: Final[tuple[Section, ...]] = (draining.SECTION,)
+SECTIONS: Final[tuple[Section, ...]] = (
+    draining.SECTION,
+    shear.SECTION,
+    critical_hamaker.SECTION,
+    viscosity.SECTION,
+    exponents.SECTION,
+    unequal.SECTION,
+)
 
 
 def chosen(names: Sequence[str]) -> tuple[Section, ...]:
