@@ -45,7 +45,7 @@ class Curve(NamedTuple):
 @matplotlib.rc_context(STYLE)
 def snapshots(run: Run) -> Figure:
     """Draw the last turn of a doublet as a row of snapshots colored by tension."""
-    figure = Figure(figsize=(WIDTH, 2.3), layout="constrained")
+    figure = Figure(figsize=(WIDTH, 1.6), layout="constrained")
     axes = figure.add_subplot()
     since = run.time - (run.period or run.time)
     turn = run.frames.time >= since
