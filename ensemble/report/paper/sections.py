@@ -7,8 +7,10 @@ from typing import Final
 
 from ensemble.report.paper import (
     critical_hamaker,
+    doublets,
     draining,
     exponents,
+    extension,
     shear,
     unequal,
     viscosity,
@@ -17,6 +19,8 @@ from ensemble.report.paper.section import Section
 
 SECTIONS: Final[tuple[Section, ...]] = (
     draining.SECTION,
+    doublets.SECTION,
+    extension.SECTION,
     shear.SECTION,
     critical_hamaker.SECTION,
     viscosity.SECTION,

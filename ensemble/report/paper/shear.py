@@ -9,6 +9,7 @@ from itertools import pairwise
 from ensemble.report.paper import shear_figures
 from ensemble.report.paper.case import Case
 from ensemble.report.paper.comparison import Row, number, words
+from ensemble.report.paper.filmstrip import filmstrip
 from ensemble.report.paper.published import published
 from ensemble.report.paper.results import Results
 from ensemble.report.paper.section import Chapter, Course, Drawing, Plan, Section
@@ -17,6 +18,7 @@ from ensemble.report.paper.shear_figures import Curve
 from solver.run import Run
 
 _WEAK, _STRONG = 0.7, 2.1  # Hamaker constants of the published snapshots; their periods are nearly the same
+_SHOWN_TIMES = tuple(float(time) for time in range(0, 60, 6))
 _SLIDES = 1.3  # variation of the center distance in a turn from which on a doublet slides
 _HAMAKERS = tuple(step / 10 for step in range(1, 11))  # of the distance curves
 _ALLOWED = 1.0  # percent, of published periods
@@ -66,7 +68,11 @@ def _course(quick: bool) -> Course:
     return Chapter(
         [
             "The weak doublet slides open in every half turn; the strong one tumbles as one body.",
-            *(_snapshots(hamaker, run) for hamaker, run in runs.items()),
+            Drawing(
+                "snapshots",
+                "A weakly and a strongly adhering doublet, shear rate 0.5, δ = 0.4, colored by tension.",
+                filmstrip({rf"$\mathcal{{H}}$ = {at:g}": run for at, run in runs.items()}, _SHOWN_TIMES),
+            ),
             _motion_rows(runs),
             Drawing(
                 "distance",
@@ -95,15 +101,6 @@ def _course(quick: bool) -> Course:
 def _of_area(hamaker: float, rate: float, reduced_area: float) -> Case:
     """A doublet of the published runs' length and another reduced area."""
     return Doublet(hamaker, rate, as_published=True).case.but({"vesicles.reduced_area": reduced_area})
-
-
-def _snapshots(hamaker: float, run: Run) -> Drawing:
-    return Drawing(
-        f"snapshots-{hamaker:g}",
-        f"One turn of a doublet with H = {hamaker:g}, shear rate 0.5, δ = 0.4; membranes colored by tension.",
-        shear_figures.snapshots(run),
-        Doublet(hamaker).case.command,
-    )
 
 
 def opening(run: Run) -> float:

@@ -9,12 +9,11 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from ensemble.figures.membranes import draw_membranes, extension
 from ensemble.figures.style import BLUE, GRAY, GREEN, ORANGE, PURPLE, STYLE, VERMILLION, WIDTH
 from ensemble.figures.symbols import DISTANCE, SHEAR_RATE
 from ensemble.report.paper.published import published
 from ensemble.report.paper.shear_doublet import Doublet
-from solver.run import Frames, Outcome, Run
+from solver.run import Outcome, Run
 
 _COLORS = (BLUE, GREEN, ORANGE, PURPLE)
 _H = r"\mathcal{H}"
@@ -40,28 +39,6 @@ class Curve(NamedTuple):
             for kind in (False, True)
         )
         return self._replace(exact=exact, as_published=as_published)
-
-
-@matplotlib.rc_context(STYLE)
-def snapshots(run: Run) -> Figure:
-    """Draw the last turn of a doublet as a row of snapshots colored by tension."""
-    figure = Figure(figsize=(WIDTH, 1.6), layout="constrained")
-    axes = figure.add_subplot()
-    since = run.time - (run.period or run.time)
-    turn = run.frames.time >= since
-    frames = Frames(*(values[turn] for values in vars(run.frames).values()))
-    membranes = draw_membranes(axes, run.scene, frames)
-    figure.colorbar(
-        membranes,
-        ax=axes,
-        location="bottom",
-        extend=extension(membranes),
-        shrink=0.5,
-        aspect=40,
-        pad=0.05,
-        label=r"tension $\sigma$",
-    )
-    return figure
 
 
 @matplotlib.rc_context(STYLE)
