@@ -34,7 +34,7 @@ _NAMES: Final = {
 
 
 def _single(reduced_area: float) -> Case:
-    return Case.of("vesicle-shear", {"vesicles.reduced_area": reduced_area, "numerics.points": "auto"})
+    return Case.of("vesicle-shear", {"vesicles.reduced_area": reduced_area, "numerics.points": 128})
 
 
 def _doublet(reduced_area: float, hamaker: float = _HAMAKER) -> Case:
