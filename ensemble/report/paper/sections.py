@@ -5,7 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from ensemble.report.paper import doublets, draining, extension, trap
+from ensemble.report.paper import (
+    critical_hamaker,
+    doublets,
+    draining,
+    exponents,
+    extension,
+    shear,
+    trap,
+    unequal,
+    viscosity,
+)
 from ensemble.report.paper.section import Section
 
 SECTIONS: Final[tuple[Section, ...]] = (
@@ -13,6 +23,11 @@ SECTIONS: Final[tuple[Section, ...]] = (
     doublets.SECTION,
     extension.SECTION,
     trap.SECTION,
+    shear.SECTION,
+    critical_hamaker.SECTION,
+    viscosity.SECTION,
+    exponents.SECTION,
+    unequal.SECTION,
 )
 
 
