@@ -200,6 +200,6 @@ def _switch_error(spacing: float, width: float) -> float:
     """Error of the trapezoid rule across the ends of the switch, relative to the force.
 
     A jump J of the fifth derivative by x/width leaves 2 J (spacing/(2π width))⁶ at most, after Euler and
-    Maclaurin; all ends and the jumps of higher derivatives, measured on ellipses, leave up to 10 times as much.
+    Maclaurin; all ends and higher derivatives, measured on ellipses, leave up to 10 times as much.
     """
     return float(20 * _JUMP * (spacing / (2 * np.pi * width)) ** 6)

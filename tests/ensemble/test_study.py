@@ -19,9 +19,25 @@ from ensemble.study import Study, load_scene, load_study, preset_names
 from solver.run import Outcome
 from solver.scene import Adhesion, Scene, Shear, Trap
 
-DOUBLET_STUDIES = ("critical-extension-rate", "critical-hamaker", "critical-hamaker-contrast")
+DOUBLET_STUDIES = (
+    "critical-extension-hamaker",
+    "critical-extension-rate",
+    "critical-hamaker-contrast",
+    "critical-hamaker-reduced-area",
+    "critical-hamaker-short-range",
+    "critical-hamaker",
+    "critical-separation-rate",
+)
 STUDIES = (*DOUBLET_STUDIES, "critical-viscosity-contrast")
-PUBLISHED = ("doublet-quiescent", "doublet-shear", "doublet-trap", "vesicle-shear")
+PUBLISHED = (
+    "doublet-draining",
+    "doublet-equilibrium",
+    "doublet-quiescent",
+    "doublet-shear",
+    "doublet-trap",
+    "pair-extension",
+    "vesicle-shear",
+)
 SCENES = (*PUBLISHED, "cluster-quiescent", "doublet-unequal", "suspension-shear")
 
 HAMAKER = load_study("critical-hamaker")
@@ -65,7 +81,6 @@ def test_no_doublet_starts_in_contact() -> None:
     assert len(doublets) == len(scenes) - 1
     for left, right in doublets:
         assert left.angle == right.angle == math.pi / 2
-        assert left.center[1] == right.center[1] == 0
         widths = sum(ellipse_half_width(vesicle.reduced_area, vesicle.length) for vesicle in (left, right))
         assert right.center[0] - left.center[0] - widths > 0.4
 
@@ -88,7 +103,7 @@ def test_parameters_of_the_published_scenes() -> None:
     assert single.adhesion is None
 
 
-@pytest.mark.parametrize("name", ["cluster-quiescent", "suspension-shear"])
+@pytest.mark.parametrize("name", ["cluster-quiescent", "doublet-unequal", "suspension-shear"])
 def test_tens_of_vesicles_begin_within_reach_of_adhesion_but_apart(name: str) -> None:
     scene = load_scene(name)
     assert len(scene.vesicles) == 24
