@@ -38,7 +38,8 @@ PUBLISHED = (
     "pair-extension",
     "vesicle-shear",
 )
-SCENES = (*PUBLISHED, "cluster-quiescent", "doublet-unequal", "suspension-shear")
+MANY = ("cluster-quiescent", "suspension-shear")
+SCENES = (*PUBLISHED, *MANY, "doublet-unequal")
 
 HAMAKER = load_study("critical-hamaker")
 GRID = GeometricGrid(HAMAKER.search.tolerance)
@@ -103,7 +104,7 @@ def test_parameters_of_the_published_scenes() -> None:
     assert single.adhesion is None
 
 
-@pytest.mark.parametrize("name", ["cluster-quiescent", "doublet-unequal", "suspension-shear"])
+@pytest.mark.parametrize("name", MANY)
 def test_tens_of_vesicles_begin_within_reach_of_adhesion_but_apart(name: str) -> None:
     scene = load_scene(name)
     assert len(scene.vesicles) == 24
