@@ -11,11 +11,13 @@ import { color, isDark } from "./theme.js";
  * @typedef {import("./frames.js").Membrane} Membrane
  */
 
-const MEMBRANE_WIDTH = 4.5; // pixels, as all that follow
+const THICKEST_MEMBRANE = 4.5; // pixels, as all that follow
+const THINNEST_MEMBRANE = 1.2;
 const ARROWS_APART = 56;
 const LONGEST_ARROW = 34;
 const MARGIN = 28;
 const FOOT = 48; // below the drawing, for the color bar and the scale
+const MEMBRANE_THICKNESS = 0.1; // of the unit of length, within these bounds
 const BAR = { width: 180, height: 8 };
 
 /** A view that moves with the mean of the vesicles' centers, at one scale for the whole run. */
@@ -45,6 +47,7 @@ export class MembraneCanvas {
     const { width, height } = this.#fit();
     const [halfWidth, halfHeight] = [width / 2 - MARGIN, (height - FOOT) / 2 - MARGIN];
     const scale = Math.min(halfWidth / this.reach.x, halfHeight / this.reach.y);
+    const thickness = Math.max(THINNEST_MEMBRANE, Math.min(THICKEST_MEMBRANE, MEMBRANE_THICKNESS * scale));
     const [x, y] = meanCenter(state);
     const [left, top] = [width / 2, (height - FOOT) / 2];
     context.clearRect(0, 0, width, height);
@@ -54,6 +57,7 @@ export class MembraneCanvas {
         membrane,
         (value) => left + scale * (value - x),
         (value) => top - scale * (value - y),
+        thickness,
       );
     }
     this.#drawColorBar(width, height);
@@ -79,8 +83,9 @@ export class MembraneCanvas {
    * @param {Membrane} membrane
    * @param {(x: number) => number} across
    * @param {(y: number) => number} down
+   * @param {number} lineWidth - Thin where vesicles are many and small.
    */
-  #drawMembrane({ x, y, tension }, across, down) {
+  #drawMembrane({ x, y, tension }, across, down, lineWidth) {
     const { context } = this;
     const [low, high] = this.range;
     const count = x.length;
@@ -88,7 +93,7 @@ export class MembraneCanvas {
     x.forEach((_, point) => context.lineTo(across(x[point]), down(y[point])));
     context.fillStyle = this.style.surface; // the arrows are those of the fluid around
     context.fill();
-    context.lineWidth = MEMBRANE_WIDTH;
+    context.lineWidth = lineWidth;
     context.lineCap = "round";
     for (let point = 0; point < count; point += 1) {
       const [before, after] = [(point + count - 1) % count, (point + 1) % count];

@@ -20,6 +20,8 @@ const BY_PATH = {
   "vesicles.bending_modulus": { name: "bending modulus", symbol: "κ" },
 };
 
+const MOST_NUMBERS = 3; // that are listed
+
 /** @type {Record<string, string>} */
 const FLOWS = { shear: "shear flow", extension: "extensional flow", trap: "a fluid trap" };
 
@@ -57,12 +59,23 @@ export function describe(scene, without = []) {
     .filter(([path, numbers]) => numbers.length > 0 && !without.includes(path))
     .map(
       ([path, numbers]) =>
-        `${quantity(path, scene).symbol} = ${numbers.map((value) => number(/** @type {number} */ (value))).join(" and ")}`,
+        `${quantity(path, scene).symbol} = ${listed(/** @type {number[]} */ (numbers))}`,
     );
   const count = scene.vesicles.length;
   const vesicles = count === 1 ? "1 vesicle" : `${count} vesicles`;
   const flow = scene.flow ? FLOWS[scene.flow.kind] : "quiescent fluid";
   return [`${vesicles} in ${flow}`, ...shown].join(", ");
+}
+
+/**
+ * Each of a few numbers, the ends of many.
+ *
+ * @param {number[]} values - Ascending.
+ */
+function listed(values) {
+  return values.length > MOST_NUMBERS
+    ? `${number(values[0], 3)} to ${number(values[values.length - 1], 3)}`
+    : values.map((value) => number(value)).join(" and ");
 }
 
 /**

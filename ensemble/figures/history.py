@@ -13,7 +13,8 @@ from ensemble.figures.membranes import choose_snapshots, draw_membranes, extensi
 from ensemble.figures.panels import PANELS
 from ensemble.figures.style import GRAY, STYLE, WIDTH
 from ensemble.figures.symbols import describe
-from solver.run import Run
+from solver.contacts import CONTACT
+from solver.run import Array, Run
 
 # Heights in inches.
 _PANEL = 1.8
@@ -21,6 +22,9 @@ _LINE = 0.2
 _STRIP = (0.3, 3.0)  # of the membranes, at least and at most
 _AROUND_STRIP = 0.85  # their times above and the color bar below
 
+_CLUSTERS = (
+    f"filled: vesicles nearer than {CONTACT:g} adhesion distances to each other, a color for each cluster"
+)
 _CHARACTERS = 105  # in a line of the heading
 
 
@@ -36,8 +40,8 @@ def run_figure(run: Run) -> Figure:
     -------
     Figure
         Its axes are labeled ``membranes``, ``tension`` (the color bar) and, below, by the first of the series
-        that they show: ``gap``, ``center_angle``, ``inclination_angle``, ``bending_energy``,
-        ``viscosity_bending_tension``.
+        that they show: ``gap``, ``center_angle``, ``inclination_angle``, ``clusters``,
+        ``bending_energy``, ``viscosity_bending_tension``.
     """
     panels = {name: draw for name, draw in PANELS.items() if name in run.series}
     columns = 3 if len(panels) == 3 else 2
@@ -48,7 +52,12 @@ def run_figure(run: Run) -> Figure:
     figure.suptitle("\n".join(heading), fontsize="medium")
     grid = figure.add_gridspec(2, 1)
     strip = figure.add_subplot(grid[0], label="membranes")
-    membranes = draw_membranes(strip, run.scene, run.frames)
+    clusters = _clusters(run)
+    membranes = draw_membranes(strip, run.scene, run.frames, clusters)
+    if clusters is not None:
+        strip.annotate(
+            _CLUSTERS, (0, 0), (0, -2), "axes fraction", "offset points", va="top", fontsize="small"
+        )
     bar = figure.colorbar(
         membranes,
         ax=strip,
@@ -75,6 +84,15 @@ def run_figure(run: Run) -> Figure:
     grid.set_height_ratios([height, rows * _PANEL])
     figure.set_size_inches(WIDTH, len(heading) * _LINE + height + _AROUND_STRIP + rows * _PANEL)
     return figure
+
+
+def _clusters(run: Run) -> Array | None:
+    """Number of the cluster of each vesicle in each frame, as it was recorded nearest in time."""
+    labels = run.vesicle_series.get("vesicle_cluster")
+    if labels is None:
+        return None
+    nearest = np.abs(run.series["time"][:, None] - run.frames.time).argmin(axis=0)
+    return np.asarray(labels[nearest])
 
 
 def _heading(run: Run) -> list[str]:

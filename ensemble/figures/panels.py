@@ -22,6 +22,7 @@ def _draw_gap(axes: Axes, run: Run) -> None:
     axes.set(ylabel="gap", ylim=(0, None))
     if run.scene.adhesion is not None:
         distance = run.scene.adhesion.distance
+        axes.set_ylim(top=max(axes.get_ylim()[1], 1.05 * distance))
         axes.axhline(distance, color=GRAY, linewidth=0.9, linestyle="--")
         beside = axes.get_yaxis_transform()
         axes.annotate(f"${DISTANCE.symbol}$", (1, distance), (3, 0), beside, "offset points", va="center")
@@ -64,11 +65,27 @@ def _draw_viscosity(axes: Axes, run: Run) -> None:
     axes.set_ylabel(r"intrinsic viscosity $[\mu]$")
 
 
+def _draw_clusters(axes: Axes, run: Run) -> None:
+    time = run.series["time"]
+    axes.step(time, run.series["clusters"], where="mid", color=BLUE, label="clusters")
+    axes.step(
+        time,
+        run.series["largest_cluster"],
+        where="mid",
+        color=VERMILLION,
+        linestyle="-.",
+        label="largest",
+    )
+    axes.set(ylabel="number", ylim=(0, None))
+    axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=2, borderaxespad=0.2)
+
+
 # By the series without which a panel is left out.
 PANELS: Final[dict[str, Callable[[Axes, Run], None]]] = {
     "gap": _draw_gap,
     "center_angle": _draw_center_angle,
     "inclination_angle": _draw_inclination,
+    "clusters": _draw_clusters,
     "bending_energy": _draw_energy,
     "viscosity_bending_tension": _draw_viscosity,
 }

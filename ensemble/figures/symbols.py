@@ -38,6 +38,8 @@ _BY_PATH = {
     "vesicles.bending_modulus": Quantity.named("bending modulus", r"\kappa_b"),
 }
 
+_MOST_NUMBERS = 3  # that are listed
+
 _FLOW_WORDS = {
     None: "quiescent fluid",
     "shear": "shear flow",
@@ -77,8 +79,15 @@ def describe(scene: Scene, without: Collection[str] = ()) -> str:
     count = len(scene.vesicles)
     words = [f"{count} vesicles" if count > 1 else "1 vesicle", f"in {_FLOW_WORDS[flow]}"]
     parameters = [
-        f"${quantity(path, flow).symbol}$ = " + " and ".join(f"{number:g}" for number in numbers)
+        f"${quantity(path, flow).symbol}$ = {_numbers(numbers)}"
         for path, numbers in values.items()
         if path not in without
     ]
     return ", ".join([" ".join(words), *parameters])
+
+
+def _numbers(values: list[float]) -> str:
+    """Each of a few numbers, the ends of many."""
+    if len(values) > _MOST_NUMBERS:
+        return f"{values[0]:.3g} to {values[-1]:.3g}"
+    return " and ".join(f"{number:g}" for number in values)

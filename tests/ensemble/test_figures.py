@@ -14,16 +14,17 @@ import matplotlib
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
+from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ensemble.boundary import Boundary, BoundaryPoint
 from ensemble.figures import phase_diagram, run_figure, save
 from ensemble.figures.style import MARKS, TENSION_COLORS
+from ensemble.figures.symbols import describe
 from solver.curve import positions
 from solver.run import Energy, Errors, Frames, Outcome, Run, Work
-from solver.scene import Scene
+from solver.scene import Scene, Vesicle
 
 POINTS = 64
 ALPHA = 2 * np.pi * np.arange(POINTS) / POINTS
@@ -118,6 +119,22 @@ def known_tension(alpha: Any, time: Any, vesicle: Any) -> Any:
     return np.cos(2 * alpha + vesicle) + 0.1 * time
 
 
+def suspension(spread: float = 1.0) -> Run:
+    """A made-up run of six vesicles of which, at the end, three are together and two others are."""
+    run = orbit(6)
+    place = np.array([(3.0 * column, 3.0 * row) for row in range(2) for column in range(3)])
+    center = np.tile(place * (spread, 1.0), (len(run.frames.time), 1, 1))
+    labels = np.tile(np.arange(6.0), (len(run.series["time"]), 1))
+    labels[-5:] = (0, 0, 1, 0, 2, 2)
+    sizes = {"clusters": labels.max(axis=1) + 1, "largest_cluster": np.where(labels[:, 1] == 0, 3.0, 1.0)}
+    return replace(
+        run,
+        series={**run.series, **sizes},
+        frames=replace(run.frames, center=center),
+        vesicle_series={"vesicle_cluster": labels},
+    )
+
+
 def artist(axes: Axes, group: str) -> Any:
     (found,) = axes.findobj(lambda candidate: candidate.get_gid() == group)
     return found
@@ -134,9 +151,9 @@ def snapshots(figure: Figure) -> tuple[LineCollection, Axes]:
     return lines, axes
 
 
-def segments(figure: Figure, vesicles: int = 2) -> Any:
+def segments(figure: Figure, vesicles: int = 2, pieces: int = 128) -> Any:
     """Ends of the drawn segments, shape (snapshots, vesicles, segments, 2 ends, 2)."""
-    return np.array(snapshots(figure)[0].get_segments()).reshape(-1, vesicles, 128, 2, 2)
+    return np.array(snapshots(figure)[0].get_segments()).reshape(-1, vesicles, pieces, 2, 2)
 
 
 def snapshot_times(axes: Axes) -> list[float]:
@@ -469,3 +486,45 @@ def test_figures_leave_no_global_state(tmp_path: Path) -> None:
     assert dict(matplotlib.rcParams) == before
     code = "import sys, ensemble.figures; sys.exit('matplotlib.pyplot' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_vesicles_of_one_cluster_are_filled_with_one_color() -> None:
+    figure = run_figure(suspension())
+    axes = panel(figure, "membranes")
+    (filled,) = (found for found in axes.collections if isinstance(found, PolyCollection))
+    colors = filled.get_facecolor()
+    assert len(filled.get_paths()) == len(colors) == 5  # of the last of three snapshots alone
+    first, second = colors[0], colors[3]
+    assert not np.array_equal(first, second)
+    np.testing.assert_array_equal(colors, [first, first, first, second, second])
+    middles = np.array([path.vertices[:-1].mean(axis=0) for path in filled.get_paths()])
+    np.testing.assert_allclose(np.diff(middles, axis=0)[:, 1], [0, 3, 0, 0], atol=0.01)
+
+
+def test_the_clusters_are_shown_over_time() -> None:
+    run = suspension()
+    figure = run_figure(run)
+    drawn = {line.get_label(): line.get_ydata() for line in panel(figure, "clusters").get_lines()}
+    np.testing.assert_array_equal(drawn["clusters"], run.series["clusters"])
+    np.testing.assert_array_equal(drawn["largest"], run.series["largest_cluster"])
+
+
+@pytest.mark.parametrize(("spread", "stacked"), [(1.0, False), (9.0, True)])
+def test_wide_snapshots_are_drawn_below_each_other(spread: float, stacked: bool) -> None:
+    run = suspension(spread)
+    ends = segments(run_figure(run), vesicles=6, pieces=64)
+    middles = ends.mean(axis=(1, 2, 3))
+    assert len(middles) == 3
+    along, across = (1, 0) if stacked else (0, 1)
+    assert np.abs(np.diff(middles[:, along])).min() > 3
+    np.testing.assert_allclose(middles[:, across], middles[0, across], atol=1e-9)
+
+
+def test_many_different_numbers_are_given_by_their_ends() -> None:
+    vesicles = tuple(
+        Vesicle(reduced_area=0.7 + 0.05 * number, center=(3.0 * number, 0.0)) for number in range(5)
+    )
+    words = describe(Scene(horizon=1.0, vesicles=vesicles))
+    assert "= 0.7 to 0.9" in words
+    assert "0.75" not in words
+    assert "0.7 and 0.75 and 0.8" in describe(Scene(horizon=1.0, vesicles=vesicles[:3]))
