@@ -186,8 +186,8 @@ def test_steps_with_blocks_converge_to_those_with_the_whole_jacobian() -> None:
 def test_deferred_correction_keeps_its_order_with_blocks() -> None:
     scene = suspension(4, 16, 1e-9, adhesion=None)
     sums = Suspension.of(scene, SERIAL)
-    formulas = BlockBackwardDifferentiation(sums.rate, sums.jacobian, placed_state(scene), 1e-4, 0.3)
-    state = all_steps(formulas, 0.3)[-1].state
+    formulas = BlockBackwardDifferentiation(sums.rate, sums.jacobian, placed_state(scene), 1e-4, 0.5)
+    state = all_steps(formulas, 0.5)[-1].state
 
     def final(order: int, count: int) -> Array:
         method = DeferredCorrection(order)
