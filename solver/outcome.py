@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from solver import curve
-from solver.dynamics import Dynamics
+from solver.equation import EquationOfMotion
 from solver.orbit import Orbit
 from solver.run import Outcome
 from solver.scene import Criteria, Extension, Scene, Shear, Trap
@@ -29,7 +29,7 @@ class History:
     """
 
     samples: Mapping[str, Sequence[float]]
-    dynamics: Dynamics
+    dynamics: EquationOfMotion
     orbit: Orbit | None
     state: np.ndarray
     axis: LongAxis | None = None

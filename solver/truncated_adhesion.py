@@ -21,7 +21,7 @@ from solver import scene
 from solver.adhesion import Adhesion
 from solver.compilation import compiled
 from solver.geometry import Geometry, Membranes
-from solver.proximity import Closeness
+from solver.proximity import Proximity
 from solver.refinement import MAXIMUM_FACTOR
 from solver.spectral import interpolation
 
@@ -99,7 +99,7 @@ def truncated_hessian(
 
 
 class _Group(NamedTuple):
-    """Targets within reach of a curve, and that curve refined for them."""
+    """Targets, and a curve refined for them."""
 
     target: int
     source: int
@@ -127,11 +127,11 @@ class TruncatedAdhesion(Adhesion):
             raise ValueError(
                 "adhesion.cutoff: None — attraction that ends has a distance beyond which it does"
             )
-        self._cutoff = parameters.cutoff
+        cutoff = parameters.cutoff
         distance, m, n = self._potential
-        self._truncated = distance, self._cutoff, m, n
+        self._truncated = distance, cutoff, m, n
         # Where the switch is steepest in r, at the cutoff.
-        width = (self._cutoff**2 - distance**2) / (2 * self._cutoff)
+        width = (cutoff**2 - distance**2) / (2 * cutoff)
         spacing = float(membranes.spacing.max())
         self._least_factor = 1
         while self._least_factor < MAXIMUM_FACTOR and _switch_error(spacing, width) > accuracy:
@@ -139,7 +139,7 @@ class TruncatedAdhesion(Adhesion):
             spacing /= 2
         self._switch_error = _switch_error(spacing, width)
 
-    def density(self, geometry: Geometry, closeness: Closeness) -> Array:
+    def density(self, geometry: Geometry, closeness: Proximity) -> Array:
         """See `Adhesion`."""
         density = np.zeros_like(geometry.points)
         for group in self._groups(geometry, closeness):
@@ -149,7 +149,7 @@ class TruncatedAdhesion(Adhesion):
             density[:, group.target, group.rows] += self._hamaker * group.weight * force
         return density
 
-    def jacobian(self, geometry: Geometry, closeness: Closeness) -> Array:
+    def jacobian(self, geometry: Geometry, closeness: Proximity) -> Array:
         """See `Adhesion`."""
         membranes = geometry.membranes
         points, size = membranes.points, membranes.count * membranes.points
@@ -168,11 +168,11 @@ class TruncatedAdhesion(Adhesion):
                 by_points[a, rows, b, rows] += pair[each].sum(axis=1)
         return geometry.by_state(membranes.fold(by_points))
 
-    def sum_error(self, closeness: Closeness) -> float:
+    def sum_error(self, closeness: Proximity) -> float:
         """See `Adhesion`."""
         return max(super().sum_error(closeness), self._switch_error)
 
-    def energy(self, geometry: Geometry, closeness: Closeness) -> float:
+    def energy(self, geometry: Geometry, closeness: Proximity) -> float:
         """See `Adhesion`."""
         total = 0.0
         for group in self._groups(geometry, closeness):
@@ -181,19 +181,15 @@ class TruncatedAdhesion(Adhesion):
             total += 0.5 * geometry.membranes.spacing[group.target] * group.weight * pair
         return float(geometry.membranes.copies * self._hamaker * total)
 
-    def _groups(self, geometry: Geometry, closeness: Closeness) -> Iterator[_Group]:
+    def _groups(self, geometry: Geometry, closeness: Proximity) -> Iterator[_Group]:
         spacing, points = geometry.membranes.curve_spacing, geometry.membranes.points
         refinement = closeness.refinement(self.ratio)
         for index, (target, source, factor) in enumerate(refinement.groups.tolist()):
             rows = refinement.rows[refinement.starts[index] : refinement.starts[index + 1]]
-            # A spacing more: distances to a curve are known to the order of its square.
-            reach = closeness.distances[target, source, rows] < self._cutoff / spacing[source] + 1
-            if not reach.any():
-                continue
             factor = max(factor, self._least_factor)
             curve = np.ascontiguousarray(geometry.curve_points[:, source])
             fine = curve if factor == 1 else curve @ interpolation(points, factor).T
-            yield _Group(target, source, rows[reach], factor, fine, spacing[source] / factor)
+            yield _Group(target, source, rows, factor, fine, spacing[source] / factor)
 
 
 def _switch_error(spacing: float, width: float) -> float:
