@@ -129,7 +129,7 @@ _AREA_TEXT = (
 )
 _AREA_CAPTION = (
     "Left: bending (solid) and adhesion (dash-dotted) energy against reduced area, H = 5; diamonds: "
-    "published.  Right: their sum, less its smallest value, for several H; circles mark the minimum."
+    "published.  Right: their sum, less its smallest value, for several H; dotted lines mark the minimum."
 )
 _HAMAKER_TEXT = (
     "At reduced area 0.95 the paper finds that the shape, hence the bending energy, hardly changes with "

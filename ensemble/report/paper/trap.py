@@ -66,7 +66,7 @@ def _course(quick: bool) -> Course:
     return Chapter(
         [
             _TEXT,
-            Drawing("snapshots", _SNAPSHOTS_CAPTION, filmstrip(films, shares=_SHOWN_SHARES)),
+            Drawing("snapshots", _SNAPSHOTS_CAPTION, filmstrip(films, shares=_SHOWN_SHARES, reach=3.3)),
             Drawing(
                 "angle",
                 _ANGLE_CAPTION,
