@@ -29,6 +29,7 @@ from solver.run import Outcome, Run
 from solver.scene import Trap
 
 _COLORS = (BLUE, GREEN, ORANGE, VERMILLION, PURPLE, SKY, BLACK)
+_TOP = 0.19  # of the phase diagram; at higher rates there are only separated pairs
 _BOX = 0.012  # half the width of a published bracket, in reduced area
 Place = tuple[float, float]  # reduced area and rate
 
@@ -129,6 +130,6 @@ def phase_diagram(
                 label="published bracket" if index == 0 else None,
             )
         )
-    axes.set_ylim(0, None)
+    axes.set_ylim(0, _TOP)
     figure.legend(loc="outside right center")
     return figure
