@@ -26,9 +26,11 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from ensemble.boundary import Boundary
+    from ensemble.report.files import Report
     from ensemble.scheduler import Traced
     from ensemble.store import Store
     from ensemble.study import Study
+    from ensemble.usage import Cost
 
 DEFAULT_STORE = Path("ensemble-store")
 DEFAULT_STUDY = "critical-hamaker"
@@ -119,7 +121,7 @@ def bisect(
         _print_json(study_document(traced, store))
     else:
         _print_table(boundary_table(traced.boundary))
-        print(_cost(traced))
+        print(_cost(traced.cost))
     converged = all(point.status == Status.CONVERGED for point in traced.boundary.points)
     raise typer.Exit(0 if converged else 1)
 
@@ -147,12 +149,12 @@ def _trace(communicator: Intracomm, study: Study, path: Path, progress: Progress
         return trace(communicator, study, store, show)
 
 
-def _cost(traced: Traced) -> str:
-    cost = f"{traced.runs} runs in {traced.wall_seconds:.1f} s"
-    if not traced.busy_fractions:
-        return cost
-    mean, least = fmean(traced.busy_fractions), min(traced.busy_fractions)
-    return f"{cost}; ranks busy {mean:.1%} of the time on average, {least:.1%} at least"
+def _cost(cost: Cost) -> str:
+    runs = f"{cost.runs} runs in {cost.wall_seconds:.1f} s"
+    if not cost.busy_fractions:
+        return runs
+    mean, least = fmean(cost.busy_fractions), min(cost.busy_fractions)
+    return f"{runs}; ranks busy {mean:.1%} of the time on average, {least:.1%} at least"
 
 
 @app.command()
@@ -270,17 +272,63 @@ def _draw(store: Store, shown: Boundary | str, output: Path) -> None:
 def report(
     name: Annotated[ReportName, typer.Argument(help="What to report.")],
     quick: Annotated[bool, typer.Option("--quick", help="Minutes instead of hours.")] = False,
+    only: Annotated[
+        list[str], typer.Option(metavar="SECTION", help="Of the paper, only this section.  Repeatable.")
+    ] = [],  # noqa: B006
     store: StorePath = DEFAULT_STORE,
     as_json: AsJson = False,
 ) -> None:
-    """Measure the solver: error against run time, or stiff and extreme scenes.
+    """Measure the solver (error against run time, extreme scenes), or recompute the paper on all ranks.
 
     The report is written into the store, which keeps its runs too: only what is missing is run.
     """
-    if launched_rank() != 0:
+    if name is ReportName.PAPER:
+        made = _paper(only, quick, store)
+    elif only:
+        raise BadInput(f"--only: the report {name} has no sections")
+    else:
+        made = _measurements(name, quick, store)
+    if made is None:
         return
+    if as_json:
+        _print_json(made.document.model_dump(mode="json"))
+    else:
+        from rich.console import Console
+        from rich.markdown import Markdown
+
+        Console().print(Markdown(made.text))
+        print(made.directory)
+
+
+def _paper(only: list[str], quick: bool, store: Path) -> Report | None:
+    """Make the paper's report on all ranks; None on all but the first."""
     from rich.console import Console
-    from rich.markdown import Markdown
+
+    from ensemble.mpi import abort_guard, on_root, world
+    from ensemble.report.paper.command import make_paper
+    from ensemble.report.paper.sections import chosen
+    from ensemble.report.progress import report_progress
+    from ensemble.store import Store
+
+    with _refusing():
+        sections = chosen(only)
+    communicator = world()
+    with abort_guard(communicator):
+        on_root(communicator, lambda: _create(store))
+        with Store.existing(store) as opened, report_progress(Console(stderr=True)) as tell:
+            return make_paper(communicator, opened, sections, quick, tell)
+
+
+def _create(store: Path) -> None:
+    with _refusing():
+        _opened(store).close()
+
+
+def _measurements(name: ReportName, quick: bool, store: Path) -> Report | None:
+    """Measure the solver on the first rank alone: nothing else may disturb the time that runs take."""
+    if launched_rank() != 0:
+        return None
+    from rich.console import Console
 
     from ensemble.report.command import make_report
     from ensemble.report.progress import report_progress
@@ -288,12 +336,7 @@ def report(
     with ExitStack() as stack:
         with _refusing():
             opened = stack.enter_context(_opened(store))
-        made = make_report(name, opened, quick, stack.enter_context(report_progress(Console(stderr=True))))
-    if as_json:
-        _print_json(made.document.model_dump(mode="json"))
-    else:
-        Console().print(Markdown(made.text))
-        print(made.directory)
+        return make_report(name, opened, quick, stack.enter_context(report_progress(Console(stderr=True))))
 
 
 @app.command()

@@ -9,7 +9,7 @@ from functools import partial
 from ensemble.boundary import Boundary, BoundaryPoint
 from ensemble.certification import Certification, Verdict, finer
 from ensemble.grid import GeometricGrid
-from ensemble.inquiry import Inquiry, Task
+from ensemble.inquiry import Inquiry, Trial
 from ensemble.parameters import parameter_value
 from ensemble.search import CriticalValue, Status
 from ensemble.study import Study
@@ -54,19 +54,19 @@ class Coordinator:
         for at, value in set(filter(None, map(self._place, made))):
             self._searches[at].take_known(value)
 
-    def next_task(self) -> Task | None:
+    def next_task(self) -> Trial | None:
         """Return the most useful task for an idle worker; None if every useful run is out already."""
         return next((task for task in map(self._next_of, self._by_use()) if task is not None), None)
 
-    def answer(self, task: Task, outcome: Outcome) -> None:
+    def answer(self, task: Trial, outcome: Outcome) -> None:
         """Take the outcome of a task's run."""
         self._inquiry_of(task).answer(task, outcome)
 
-    def cancelled(self, task: Task) -> None:
+    def cancelled(self, task: Trial) -> None:
         """Take back a task whose run was given up."""
         self._inquiry_of(task).cancelled(task)
 
-    def pointless_tasks(self) -> tuple[Task, ...]:
+    def pointless_tasks(self) -> tuple[Trial, ...]:
         """Return the tasks that are out and whose outcome no longer matters."""
         needed = list(self._inquiries())
         # A late answer may have shown that there is no single critical value, hence nothing to certify.
@@ -124,7 +124,7 @@ class Coordinator:
         # Known answers may have ended a search on the way here.
         yield from self._certifying()
 
-    def _next_of(self, inquiry: _AnyInquiry) -> Task | None:
+    def _next_of(self, inquiry: _AnyInquiry) -> Trial | None:
         if isinstance(inquiry.asking, CriticalValue) and inquiry.untouched:
             guess = self._study.guess_at(inquiry.sweep_value, self._converged())
             if guess is not None:
@@ -135,7 +135,7 @@ class Coordinator:
         yield from self._searches.values()
         yield from self._certifying()
 
-    def _inquiry_of(self, task: Task) -> _AnyInquiry:
+    def _inquiry_of(self, task: Trial) -> _AnyInquiry:
         certification = self._certifications.get(task.sweep_value)
         if certification is not None and task in certification.pending.values():
             return certification

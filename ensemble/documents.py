@@ -38,10 +38,11 @@ def run_document(summary: RunSummary) -> dict[str, Any]:
 
 def study_document(traced: Traced, store: Path) -> dict[str, Any]:
     """A traced boundary and what it cost; `busy_fraction` is None when nothing had to be run."""
+    cost = traced.cost
     return {
         "study": traced.boundary.name,
         "boundary": [point.model_dump(mode="json") for point in traced.boundary.points],
-        "wall_seconds": traced.wall_seconds,
-        "busy_fraction": fmean(traced.busy_fractions) if traced.busy_fractions else None,
+        "wall_seconds": cost.wall_seconds,
+        "busy_fraction": fmean(cost.busy_fractions) if cost.busy_fractions else None,
         "store": str(store),
     }

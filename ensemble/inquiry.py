@@ -6,20 +6,19 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
+from ensemble.agenda import Task
 from ensemble.keys import run_key
 from ensemble.search import Side
 from solver.run import Outcome
 from solver.scene import Scene
 
 
-@dataclass(frozen=True)
-class Task:
-    """A run to make: the scene, its key, and the place in the study whose question it answers."""
+@dataclass(frozen=True, kw_only=True)
+class Trial(Task):
+    """A run to make, and the place in the study whose question it answers."""
 
     sweep_value: float
     value: float
-    scene: Scene
-    key: str
 
 
 @dataclass(frozen=True)
@@ -80,12 +79,12 @@ class Inquiry(Generic[SomeAsking]):
         self._side = side
         self._known = known
         self._answers: dict[float, _Answer] = {}
-        self._pending: dict[float, Task] = {}
+        self._pending: dict[float, Trial] = {}
         self.known_answers = 0
 
     @property
-    def pending(self) -> Mapping[float, Task]:
-        """Tasks that are out, by value."""
+    def pending(self) -> Mapping[float, Trial]:
+        """Trials that are out, by value."""
         return self._pending
 
     @property
@@ -103,11 +102,11 @@ class Inquiry(Generic[SomeAsking]):
         low, high = (None if end is None else self._answers[end].outcome for end in bracket)
         return low, high
 
-    def pointless_tasks(self) -> tuple[Task, ...]:
+    def pointless_tasks(self) -> tuple[Trial, ...]:
         """Return the tasks that are out and whose outcome no longer matters."""
         return tuple(self._pending[value] for value in sorted(self.asking.pointless()))
 
-    def next_task(self) -> Task | None:
+    def next_task(self) -> Trial | None:
         """Return the task of the most useful value to try; None if there is none."""
         while (value := self.asking.ask()) is not None:
             # Another study on the same store may have made this run in the meantime.
@@ -133,20 +132,20 @@ class Inquiry(Generic[SomeAsking]):
         for task in tuple(self._pending.values()):
             self.cancelled(task)
 
-    def answer(self, task: Task, outcome: Outcome) -> None:
+    def answer(self, task: Trial, outcome: Outcome) -> None:
         """Take the outcome of a task's run."""
         del self._pending[task.value]
         self._take(task, outcome)
 
-    def cancelled(self, task: Task) -> None:
+    def cancelled(self, task: Trial) -> None:
         """Take back a task whose run was given up."""
         del self._pending[task.value]
         self.asking.withdraw(task.value)
 
-    def _task(self, value: float) -> Task:
+    def _task(self, value: float) -> Trial:
         scene = self._scene_at(value)
-        return Task(self.sweep_value, value, scene, run_key(scene))
+        return Trial(sweep_value=self.sweep_value, value=value, scene=scene, key=run_key(scene))
 
-    def _take(self, task: Task, outcome: Outcome) -> None:
+    def _take(self, task: Trial, outcome: Outcome) -> None:
         self.asking.tell(task.value, self._side(outcome))
         self._answers[task.value] = _Answer(outcome, task.key)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import timedelta
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 from rich.console import Console, Group
@@ -21,6 +21,7 @@ from rich.text import Text
 from ensemble.tables import boundary_cells, boundary_columns, bracket_text
 
 if TYPE_CHECKING:
+    from ensemble.dispatcher import Standing
     from ensemble.scheduler import Snapshot
 
 
@@ -38,9 +39,9 @@ def study_lines(console: Console) -> Iterator[Callable[[Snapshot], None]]:
     """Give a function that prints the latest snapshot of a study as a `ProgressLine`."""
 
     def show(snapshot: Snapshot) -> None:
-        left = snapshot.seconds_left
-        fraction = 0.0 if left is None else snapshot.elapsed / (snapshot.elapsed + left)
-        _print_line(console, fraction, str(_summary(snapshot)))
+        elapsed, left = snapshot.standing.elapsed, snapshot.standing.seconds_left
+        fraction = 0.0 if left is None else elapsed / (elapsed + left)
+        _print_line(console, fraction, standing_text(snapshot.standing))
 
     yield show
 
@@ -70,7 +71,9 @@ def study_progress(console: Console) -> Iterator[Callable[[Snapshot], None]]:
     """Give a function that shows the latest snapshot of a study."""
     if console.is_terminal:
         with Live(console=console) as live:
-            yield lambda snapshot: live.update(Group(_table(snapshot), _summary(snapshot)))
+            yield lambda snapshot: live.update(
+                Group(_table(snapshot), Text(standing_text(snapshot.standing)))
+            )
     else:
         yield _Lines(console).show
 
@@ -88,23 +91,24 @@ def _table(snapshot: Snapshot) -> Table:
     table = Table(*boundary_columns(points), "running")
     for point in points:
         (at,) = point.parameters.values()
-        values = sorted(task.value for task in snapshot.running.values() if task.sweep_value == at)
+        values = sorted(task.value for task in snapshot.standing.running.values() if task.sweep_value == at)
         table.add_row(*boundary_cells(point), ", ".join(f"{value:.6g}" for value in values))
     return table
 
 
-def _summary(snapshot: Snapshot) -> Text:
-    known = f" and {snapshot.known} from the store" if snapshot.known else ""
-    return Text(
-        f"{snapshot.runs} runs{known}, {len(snapshot.running)} running, "
-        f"{_duration(snapshot.elapsed)} elapsed, {_time_left(snapshot)}"
+def standing_text(standing: Standing[Any]) -> str:
+    """Say in one line how far the runs of a job have come."""
+    known = f" and {standing.known} from the store" if standing.known else ""
+    return (
+        f"{standing.runs} runs{known}, {len(standing.running)} running, "
+        f"{_duration(standing.elapsed)} elapsed, {_time_left(standing)}"
     )
 
 
-def _time_left(snapshot: Snapshot) -> str:
-    if snapshot.seconds_left is None:
+def _time_left(standing: Standing[Any]) -> str:
+    if standing.seconds_left is None:
         return "time left unknown"
-    return f"about {_duration(snapshot.seconds_left)} left"
+    return f"about {_duration(standing.seconds_left)} left"
 
 
 def _duration(seconds: float) -> str:
@@ -125,4 +129,6 @@ class _Lines:
             line = f"{name} {at:g}: {bracket_text(point)} {point.status}"
             if point.runs and line != self._shown.get(at):
                 self._shown[at] = line
-                self._console.print(f"{line} ({_summary(snapshot)})", soft_wrap=True, highlight=False)
+                self._console.print(
+                    f"{line} ({standing_text(snapshot.standing)})", soft_wrap=True, highlight=False
+                )

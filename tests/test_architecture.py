@@ -102,7 +102,7 @@ def test_the_wheel_ships_every_module_and_preset(wheel: set[str]) -> None:
     sources = {
         path.relative_to(ROOT).as_posix()
         for package in PACKAGES
-        for pattern in ("*.py", "presets/*.toml", "migrations/*.mako", "static/**/*")
+        for pattern in ("*.py", "presets/*.toml", "report/paper/*.toml", "migrations/*.mako", "static/**/*")
         for path in (ROOT / package).rglob(pattern)
         if path.is_file()
     }

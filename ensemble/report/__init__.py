@@ -1,4 +1,4 @@
-"""Reports on the solver that anyone can make again: error against run time, and stiff and extreme scenes.
+"""Reports that anyone can make again: on the solver, and the paper recomputed.
 
 The runs behind a report are kept in the store like any other, so a report that is interrupted resumes.
 """
@@ -11,3 +11,4 @@ class ReportName(StrEnum):
 
     WORK_PRECISION = "work-precision"
     STABILITY = "stability"
+    PAPER = "paper"

@@ -21,7 +21,7 @@ from ensemble.boundary import BoundaryPoint
 from ensemble.certification import Certification, Verdict, finer
 from ensemble.coordinator import Coordinator
 from ensemble.grid import GeometricGrid
-from ensemble.inquiry import Task
+from ensemble.inquiry import Trial
 from ensemble.keys import run_key
 from ensemble.search import Side
 from ensemble.store import Store
@@ -180,7 +180,7 @@ class TwoNumerics:
     shift: float = 1.0  # finer threshold over coarse threshold
     silence: float = 1.0  # finer runs from threshold/silence up to threshold·silence are undecided
 
-    def __call__(self, task: Task) -> Outcome:
+    def __call__(self, task: Trial) -> Outcome:
         assert task.scene.adhesion is not None
         assert isinstance(task.scene.flow, Shear)
         critical = 0.1 + 0.571 * task.scene.flow.rate
@@ -192,7 +192,7 @@ class TwoNumerics:
         return Outcome.BOUND if ratio > 1 else Outcome.SEPARATED
 
 
-def is_finer(task: Task) -> bool:
+def is_finer(task: Trial) -> bool:
     return task.scene.numerics.points == 128
 
 
@@ -207,13 +207,13 @@ def study() -> Study:
 
 def trace(
     coordinator: Coordinator,
-    answer: Callable[[Task], Outcome],
+    answer: Callable[[Trial], Outcome],
     workers: int = 1,
     choose: Callable[[int], int] = lambda out: 0,
-) -> list[Task]:
+) -> list[Trial]:
     """Keep workers busy, finishing at each turn the task that `choose` picks among those out."""
-    out: list[Task] = []
-    made: list[Task] = []
+    out: list[Trial] = []
+    made: list[Trial] = []
     while not coordinator.done:
         while len(out) < workers and (task := coordinator.next_task()) is not None:
             out.append(task)
@@ -335,7 +335,7 @@ def test_a_contradiction_at_the_finer_numerics_is_reported(study: Study) -> None
     values: dict[float, list[float]] = {}
     swapped = {Outcome.BOUND: Outcome.SEPARATED, Outcome.SEPARATED: Outcome.BOUND}
 
-    def contrary(task: Task) -> Outcome:
+    def contrary(task: Trial) -> Outcome:
         """Two finer runs of a point, those at the ends of its bracket, come out on the wrong sides."""
         if is_finer(task):
             values.setdefault(task.sweep_value, []).append(task.value)
@@ -374,7 +374,7 @@ def test_a_late_answer_that_contradicts_the_search_ends_its_certification() -> N
 def test_certifying_comes_before_a_second_task_of_one_search() -> None:
     two_points = load_study("critical-hamaker", ["sweep.values=[0.5, 1.0]"], 0.05, certify=True)
     coordinator, physics = Coordinator(two_points, unknown), TwoNumerics()
-    tasks: list[Task] = []
+    tasks: list[Trial] = []
     while not any(map(is_finer, tasks)):
         task = coordinator.next_task()
         assert task is not None
@@ -397,7 +397,8 @@ def test_a_search_that_others_finish_meanwhile_is_certified_at_once() -> None:
     out = coordinator.next_task()
     scenes = [one_point.scene_at(0.5, GRID.value(index)) for index in INDICES]
     tasks = [
-        Task(0.5, GRID.value(i), scene, run_key(scene)) for i, scene in zip(INDICES, scenes, strict=True)
+        Trial(sweep_value=0.5, value=GRID.value(i), scene=scene, key=run_key(scene))
+        for i, scene in zip(INDICES, scenes, strict=True)
     ]
     known.update({task.key: physics(task) for task in tasks})
     task = coordinator.next_task()

@@ -19,10 +19,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ensemble.coordinator import Coordinator
-from ensemble.inquiry import Task
-from ensemble.scheduler import Usage
+from ensemble.inquiry import Trial
 from ensemble.store import Store
 from ensemble.study import Study, load_study
+from ensemble.usage import Usage
 from solver.run import Outcome
 from solver.scene import Shear
 
@@ -34,7 +34,7 @@ def critical(rate: float) -> float:
     return 0.1 + 0.571 * rate
 
 
-def outcome_of(task: Task) -> Outcome:
+def outcome_of(task: Trial) -> Outcome:
     assert task.scene.adhesion is not None
     assert isinstance(task.scene.flow, Shear)
     bound = task.scene.adhesion.hamaker > critical(task.scene.flow.rate)
@@ -54,11 +54,11 @@ def trace(
     coordinator: Coordinator,
     workers: int,
     choose: Callable[[int], int],
-    answer: Callable[[Task], Outcome] = outcome_of,
-) -> list[Task]:
+    answer: Callable[[Trial], Outcome] = outcome_of,
+) -> list[Trial]:
     """Keep workers busy, finishing at each turn the task that `choose` picks among those out."""
-    out: list[Task] = []
-    made: list[Task] = []
+    out: list[Trial] = []
+    made: list[Trial] = []
     while not coordinator.done:
         while len(out) < workers and (task := coordinator.next_task()) is not None:
             out.append(task)

@@ -19,8 +19,21 @@ from ensemble.study import Study, load_scene, load_study, preset_names
 from solver.run import Outcome
 from solver.scene import Adhesion, Scene, Shear, Trap
 
-STUDIES = ("critical-extension-rate", "critical-hamaker")
-PUBLISHED = ("doublet-quiescent", "doublet-shear", "doublet-trap", "vesicle-shear")
+STUDIES = (
+    "critical-extension-hamaker",
+    "critical-extension-rate",
+    "critical-hamaker",
+    "critical-separation-rate",
+)
+PUBLISHED = (
+    "doublet-draining",
+    "doublet-equilibrium",
+    "doublet-quiescent",
+    "doublet-shear",
+    "doublet-trap",
+    "pair-extension",
+    "vesicle-shear",
+)
 SCENES = (*PUBLISHED, "cluster-quiescent", "suspension-shear")
 
 HAMAKER = load_study("critical-hamaker")
@@ -63,7 +76,6 @@ def test_no_doublet_starts_in_contact() -> None:
     assert len(doublets) == len(scenes) - 1
     for left, right in doublets:
         assert left.angle == right.angle == math.pi / 2
-        assert left.center[1] == right.center[1] == 0
         widths = sum(ellipse_half_width(vesicle.reduced_area, vesicle.length) for vesicle in (left, right))
         assert right.center[0] - left.center[0] - widths > 0.4
 
