@@ -242,7 +242,10 @@ def query(
 def show(
     name: Annotated[str, typer.Argument(metavar="RUN|BOUNDARY", help="Key of either, or a boundary's name.")],
     output: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Draw it to this file: .png, .svg or .pdf.")
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Draw it to this file: .png, .svg or .pdf, or a run's movie: .mp4 or .gif."
+        ),
     ] = None,
     store: StorePath = DEFAULT_STORE,
 ) -> None:
@@ -268,11 +271,20 @@ def _boundary(store: Store, name: str) -> Boundary | None:
 
 def _draw(store: Store, shown: Boundary | str, output: Path) -> None:
     from ensemble.figures import phase_diagram, run_figure, save
+    from ensemble.figures.movie import MOVIE_SUFFIXES, save_movie
+    from ensemble.figures.output import FIGURE_SUFFIXES, suffix_among
     from ensemble.parameters import parameter_value
 
     if isinstance(shown, str):
-        save(run_figure(store.load(shown)), output)
+        if suffix_among(output, (*FIGURE_SUFFIXES, *MOVIE_SUFFIXES)) in MOVIE_SUFFIXES:
+            save_movie(store.load(shown), output)
+        else:
+            save(run_figure(store.load(shown)), output)
         return
+    if output.suffix.lower() in MOVIE_SUFFIXES:
+        raise ValueError(
+            f"output: only a run can be a movie, {shown.name} is a boundary, got {output.name!r}"
+        )
     runs = []
     for point in shown.points:
         (at,) = point.parameters.values()

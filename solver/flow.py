@@ -61,12 +61,15 @@ class TrapFlow:
         return self.linear.jacobian(by_state - by_state.mean(axis=1, keepdims=True))
 
 
-def imposed_flow(flow: scene.Shear | scene.Extension | scene.Trap, membranes: Membranes) -> ImposedFlow:
+def velocity_gradient(flow: scene.Flow) -> Array:
+    """∇u of a flow, (2, 2): row i holds the derivatives of the velocity's component i."""
+    return flow.rate * (_SHEAR if isinstance(flow, scene.Shear) else _EXTENSION)
+
+
+def imposed_flow(flow: scene.Flow, membranes: Membranes) -> ImposedFlow:
     """The flow that a scene asks for."""
-    match flow:
-        case scene.Shear():
-            return LinearFlow(flow.rate * _SHEAR)
-        case scene.Trap() if membranes.copies == 1:
-            return TrapFlow(flow.rate * _EXTENSION)
-        case scene.Extension() | scene.Trap():  # vesicles and their images have the origin as their mean
-            return LinearFlow(flow.rate * _EXTENSION)
+    gradient = velocity_gradient(flow)
+    # Vesicles and their images have the origin as their mean.
+    if isinstance(flow, scene.Trap) and membranes.copies == 1:
+        return TrapFlow(gradient)
+    return LinearFlow(gradient)

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import Normalize
+from numpy.typing import NDArray
 
 from ensemble.figures.style import CLUSTER_COLORS, PALE, TENSION_COLORS
 from solver.curve import positions
@@ -16,23 +17,27 @@ from solver.run import Array, Frames
 from solver.scene import Scene
 from solver.spectral import interpolation
 
-_FEW = 4  # vesicles, up to which they are drawn large enough for many snapshots and thick lines
+FEW = 4  # vesicles, up to which they are drawn large enough for many snapshots and thick lines
 _SEGMENTS = 128  # of a drawn membrane, at least: a polygon of 64 sides shows its corners in print
 _SEGMENTS_OF_MANY = 48
 _SPACE = 0.5  # between neighboring snapshots, in the unit of length
 
 
 def choose_snapshots(frames: Frames) -> list[int]:
-    """Return the indices of at most eight frames, evenly spread in time, the first and the last among them.
+    """Return the indices of at most eight finite frames, evenly spread in time, first and last among them.
 
-    Of many vesicles there are at most three.  Frames of which a position is not finite, as a failed run may
-    end with, are passed over.
+    Of many vesicles there are at most three.
     """
-    finite = np.isfinite(frames.tangent_angle).all(axis=(1, 2)) & np.isfinite(frames.center).all(axis=(1, 2))
-    drawable = np.flatnonzero(finite)
+    drawable = finite_frames(frames)
     times = frames.time[drawable]
-    wanted = np.linspace(times[0], times[-1], 8 if frames.center.shape[1] <= _FEW else 3)
+    wanted = np.linspace(times[0], times[-1], 8 if frames.center.shape[1] <= FEW else 3)
     return sorted({int(drawable[np.abs(times - time).argmin()]) for time in wanted})
+
+
+def finite_frames(frames: Frames) -> NDArray[np.intp]:
+    """Return the indices of the frames of which every position is finite; failed runs may end with others."""
+    finite = np.isfinite(frames.tangent_angle).all(axis=(1, 2)) & np.isfinite(frames.center).all(axis=(1, 2))
+    return np.flatnonzero(finite)
 
 
 def membrane_segments(
@@ -55,7 +60,7 @@ def membrane_segments(
         Mean of the tensions at the two ends.
     """
     vesicles, points = tangent_angle.shape[-2:]
-    wanted = _SEGMENTS if vesicles <= _FEW else _SEGMENTS_OF_MANY
+    wanted = _SEGMENTS if vesicles <= FEW else _SEGMENTS_OF_MANY
     refine = interpolation(points, math.ceil(wanted / points))
     length = np.array([vesicle.length for vesicle in scene.vesicles])
     about_mean = center - center.mean(axis=-2, keepdims=True)
@@ -96,8 +101,8 @@ def draw_membranes(axes: Axes, scene: Scene, frames: Frames, clusters: Array | N
     lines = LineCollection(
         list(ends.reshape(-1, 2, 2)),
         cmap=TENSION_COLORS,
-        norm=_scale(tension),
-        linewidths=1.6 if len(scene.vesicles) <= _FEW else 0.8,
+        norm=tension_scale(tension),
+        linewidths=1.6 if len(scene.vesicles) <= FEW else 0.8,
         capstyle="round",
     )
     lines.set_array(np.ma.masked_invalid(tension.ravel()))
@@ -162,7 +167,7 @@ def extension(membranes: LineCollection) -> Literal["neither", "min", "max", "bo
     return "min" if below else "max" if above else "neither"
 
 
-def _scale(tension: Array) -> Normalize:
+def tension_scale(tension: Array) -> Normalize:
     """Color scale over the finite tensions, never so narrow that it would show rounding errors.
 
     The first snapshot does not count where there are others: an ellipse that has not relaxed yet has

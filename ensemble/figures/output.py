@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Final
 
 import matplotlib
 from matplotlib.figure import Figure
@@ -12,6 +15,8 @@ from ensemble.figures.style import STYLE
 
 # What a format would date its files with, blanked so that equal figures are equal files.
 _UNDATED = {".png": {}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
+
+FIGURE_SUFFIXES: Final = tuple(_UNDATED)
 
 
 def save(figure: Figure, path: Path) -> None:
@@ -30,14 +35,32 @@ def save(figure: Figure, path: Path) -> None:
     ValueError
         For any other suffix.
     """
+    suffix = suffix_among(path, FIGURE_SUFFIXES)
+    with appearing(path) as unfinished, matplotlib.rc_context(STYLE):
+        figure.savefig(unfinished, metadata=_UNDATED[suffix])
+
+
+def suffix_among(path: Path, suffixes: Sequence[str]) -> str:
+    """Return the suffix of a file, in lower case.
+
+    Raises
+    ------
+    ValueError
+        If it is not one of ``suffixes``.
+    """
     suffix = path.suffix.lower()
-    if suffix not in _UNDATED:
-        *others, last = _UNDATED
+    if suffix not in suffixes:
+        *others, last = suffixes
         raise ValueError(f"output: must end in {', '.join(others)} or {last}, got {path.name!r}")
-    unfinished = path.with_name(f".{path.name}.{os.getpid()}")
+    return suffix
+
+
+@contextmanager
+def appearing(path: Path) -> Iterator[Path]:
+    """Give a file to write beside ``path``, with its suffix, that takes its place once it is complete."""
+    unfinished = path.with_name(f".{os.getpid()}.{path.name}")
     try:
-        with matplotlib.rc_context(STYLE):
-            figure.savefig(unfinished, format=suffix[1:], metadata=_UNDATED[suffix])
+        yield unfinished
         unfinished.replace(path)
     finally:
         unfinished.unlink(missing_ok=True)

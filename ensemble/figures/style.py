@@ -45,6 +45,7 @@ PURPLE: Final = "#CC79A7"
 BLACK: Final = "#000000"
 GRAY: Final = "#8C8C8C"
 PALE: Final = "#F4F4F4"
+INSIDE: Final = "#EAF3F9"  # of a vesicle
 
 CLUSTER_COLORS: Final = (BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILLION)
 

@@ -282,8 +282,21 @@ def test_show_draws_runs_and_boundaries(ensemble, finished_study, stored_run, tm
         "show", stored_run[1]["run_key"], f"--store={stored_run[0]}", f"--output={tmp_path / 'history.doc'}"
     )
     assert refused.returncode == 2
-    assert "output" in refused.stderr
+    assert "output: must end in .png, .svg, .pdf, .mp4 or .gif" in refused.stderr
     assert not (tmp_path / "history.doc").exists()
+
+
+def test_show_makes_movies_of_runs_only(ensemble, finished_study, stored_run, tmp_path):
+    movie = tmp_path / "run.mp4"
+    made = ensemble("show", stored_run[1]["run_key"], f"--store={stored_run[0]}", f"--output={movie}")
+    assert made.returncode == 0, made.stderr
+    assert movie.read_bytes()[4:8] == b"ftyp"
+    refused = ensemble(
+        "show", "critical-hamaker", f"--store={finished_study.store}", f"--output={tmp_path / 'diagram.gif'}"
+    )
+    assert refused.returncode == 2
+    assert "output: only a run can be a movie, critical-hamaker is a boundary" in refused.stderr
+    assert list(tmp_path.iterdir()) == [movie]
 
 
 def test_show_and_export_refuse_what_the_store_does_not_have(ensemble, stored_run, tmp_path):

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from ensemble.report.paper import draining
+from ensemble.report.paper import doublets, draining, extension
 from ensemble.report.paper.section import Section
 
-SECTIONS: Final[tuple[Section, ...]] = (draining.SECTION,)
+SECTIONS: Final[tuple[Section, ...]] = (draining.SECTION, doublets.SECTION, extension.SECTION)
 
 
 def chosen(names: Sequence[str]) -> tuple[Section, ...]:

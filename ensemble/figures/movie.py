@@ -1,0 +1,255 @@
+"""Moving pictures of a run: membranes colored by tension in the imposed flow, beside diagnostics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import imageio_ffmpeg
+import matplotlib
+import numpy as np
+from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.gridspec import SubplotSpec
+from scipy.interpolate import Akima1DInterpolator
+
+from ensemble.figures.membranes import FEW, extension, finite_frames, membrane_segments, tension_scale
+from ensemble.figures.output import appearing
+from ensemble.figures.panels import PANELS
+from ensemble.figures.style import GRAY, INSIDE, STYLE, TENSION_COLORS, VERMILLION
+from ensemble.figures.symbols import describe
+from solver.flow import velocity_gradient
+from solver.run import Array, Frames, Run
+
+_PACE = 8.0  # units of time a second: a doublet at shear rate 0.5 takes about five seconds a turn
+_DURATION = (5.0, 20.0)  # seconds, at least and at most
+_HOLD = 1.0  # second for which the last state stays before a player begins again
+
+_SIZE = (8.0, 4.5)  # inches
+_TRACES = 2  # diagnostics beside the membranes, at most
+_MARGIN = 0.5  # around the membranes, in the unit of length
+_ARROWS = 12  # of the flow, along the longer side of the view
+
+
+class _Format(NamedTuple):
+    """How moving pictures of one kind are written."""
+
+    writer: Callable[..., AbstractMovieWriter]
+    options: dict[str, Any]
+    rate: int  # pictures a second
+    resolution: int  # dots per inch
+
+
+_FORMATS: Final = {
+    ".mp4": _Format(FFMpegWriter, {"codec": "h264", "extra_args": ["-crf", "18"]}, 30, 160),
+    ".gif": _Format(PillowWriter, {}, 20, 80),
+}
+MOVIE_SUFFIXES: Final = tuple(_FORMATS)
+
+
+def save_movie(run: Run, path: Path) -> None:
+    """Write moving pictures of a run in the format that the file's suffix names.
+
+    They last from 5 to 20 seconds, whatever the run's recorded interval: states between two frames are
+    interpolated.  The file appears complete or not at all, replacing an earlier one.
+
+    Parameters
+    ----------
+    run : Run
+    path : Path
+        Ends in ``.mp4`` (1280 × 720, 30 pictures a second) or ``.gif`` (640 × 360, 20 a second).
+
+    Raises
+    ------
+    ValueError
+        If the run has no finite state.
+    """
+    form = _FORMATS[path.suffix.lower()]
+    # The encoder is the one that a wheel brought, whatever the machine has.
+    encoder = matplotlib.RcParams({"animation.ffmpeg_path": imageio_ffmpeg.get_ffmpeg_exe()})
+    with matplotlib.rc_context(STYLE), matplotlib.rc_context(encoder), appearing(path) as unfinished:
+        picture = Picture(run, form.resolution)
+        writer = form.writer(fps=form.rate, **form.options)
+        with writer.saving(picture.figure, str(unfinished), dpi=form.resolution):
+            for time in picture_times(picture.frames, form.rate):
+                picture.show(time)
+                writer.grab_frame()
+
+
+def picture_times(frames: Frames, rate: int) -> Array:
+    """Times of a run that are shown one after the other, equally spaced, the last one for a while.
+
+    Parameters
+    ----------
+    frames : Frames
+    rate : int
+        Pictures a second.
+    """
+    first, last = frames.time[[0, -1]]
+    duration = np.clip((last - first) / _PACE, *_DURATION) if last > first else 0.0
+    moving = np.linspace(first, last, round(rate * duration) + 1)
+    return np.append(moving, np.full(round(rate * _HOLD), last))
+
+
+class Picture:
+    """One picture that can show a run at any of its times.
+
+    Parameters
+    ----------
+    run : Run
+    resolution : float
+        Dots per inch.
+
+    Attributes
+    ----------
+    figure : Figure
+        What stays is an image in it, drawn once.  Its axes are labeled ``membranes``, ``tension`` (the color
+        bar) and by the series that they trace.
+    frames : Frames
+        Those of the run of which every number is finite; `show` interpolates between them.
+    membranes : LineCollection
+        Its segments are ordered by vesicle and arclength.
+
+    Raises
+    ------
+    ValueError
+        If the run has no such frame.
+    """
+
+    @matplotlib.rc_context(STYLE)
+    def __init__(self, run: Run, resolution: float) -> None:
+        self._scene = run.scene
+        self.frames = _drawable(run.frames)
+        self._between = [
+            _interpolant(self.frames.time, values)
+            for values in (self.frames.tangent_angle, self.frames.center, self.frames.tension)
+        ]
+        ends, tension = membrane_segments(
+            run.scene, self.frames.tangent_angle, self.frames.center, self.frames.tension
+        )
+        traced = [name for name in PANELS if name in run.series][:_TRACES]
+
+        self.figure = Figure(figsize=_SIZE, dpi=resolution, layout="constrained")
+        self.figure.suptitle(describe(run.scene), fontsize="medium")
+        columns = self.figure.add_gridspec(1, 2, width_ratios=(1.7, 1))
+        axes = self._add_view(columns[0], tension)
+        self._cursors = []
+        cells = columns[1].subgridspec(len(traced), 1)
+        for row, name in enumerate(traced):
+            panel = self.figure.add_subplot(cells[row], label=name)
+            PANELS[name](panel, run)
+            self._cursors.append(panel.axvline(0.0, color=VERMILLION, linewidth=1.0))
+        panel.set_xlabel("time $t$")
+
+        self.figure.draw_without_rendering()
+        self.figure.set_layout_engine("none")  # or labels would shift from picture to picture
+        _fit(axes, np.abs(ends).max(axis=(0, 1, 2, 3)) + _MARGIN)
+        if run.scene.flow is not None and run.scene.flow.rate > 0:
+            _draw_flow(axes, velocity_gradient(run.scene.flow))
+        self._freeze([self._inside, self.membranes, self._time, *self._cursors])
+
+    def show(self, time: float) -> None:
+        """Change the picture to what it shows at this time, one of the frames' or between two."""
+        ends, tension = membrane_segments(self._scene, *(values(time) for values in self._between))
+        self.membranes.set_segments(list(ends.reshape(-1, 2, 2)))
+        self.membranes.set_array(tension.ravel())
+        self._inside.set_verts(list(ends[:, :, 0]))
+        self._time.set_text(f"$t$ = {time:.1f}")
+        for cursor in self._cursors:
+            cursor.set_xdata([time, time])
+
+    def _add_view(self, cell: SubplotSpec, tension: Array) -> Axes:
+        """Add the axes that the membranes will move in, and a color bar for tensions (frames, ...)."""
+        axes = self.figure.add_subplot(cell, label="membranes")
+        axes.set_axis_off()
+        self._time = axes.text(0.0, 1.0, "", transform=axes.transAxes, va="top")
+        self._inside = PolyCollection([], facecolor=INSIDE)
+        self.membranes = LineCollection(
+            [],
+            cmap=TENSION_COLORS,
+            norm=tension_scale(tension),
+            linewidths=2.0 if len(self._scene.vesicles) <= FEW else 1.0,
+            capstyle="round",
+        )
+        axes.add_collection(self._inside, autolim=False)
+        axes.add_collection(self.membranes, autolim=False)
+        self.membranes.set_array(tension.ravel())  # of all frames: the bar says whether its scale holds them
+        bar = self.figure.colorbar(
+            self.membranes,
+            ax=axes,
+            location="bottom",
+            extend=extension(self.membranes),
+            shrink=0.6,
+            aspect=40,
+        )
+        bar.ax.set_label("tension")
+        bar.set_label(r"tension $\sigma$")
+        return axes
+
+    def _freeze(self, moving: Collection[Artist]) -> None:
+        """Turn all else into an image, since drawing axes takes most of the time of a picture."""
+        for artist in moving:
+            artist.set_visible(False)
+        canvas = FigureCanvasAgg(self.figure)
+        canvas.draw()
+        still = np.array(canvas.buffer_rgba())
+        for axes in self.figure.axes:
+            for artist in axes.get_children():
+                artist.set_visible(artist in moving)
+        self.figure.suptitle("")
+        self.figure.figimage(still, zorder=-1)
+
+
+def _drawable(frames: Frames) -> Frames:
+    kept = finite_frames(frames)
+    kept = kept[np.isfinite(frames.tension[kept]).all(axis=(1, 2))]
+    if not kept.size:
+        raise ValueError("output: the run has no finite state to show")
+    return Frames(*(values[kept] for values in vars(frames).values()))
+
+
+def _interpolant(time: Array, values: Array) -> Callable[[float], Array]:
+    """Values (frames, ...) as a function of time: cubic between frames, without overshooting."""
+    if len(time) == 1:
+        return lambda _: values[0]
+    return Akima1DInterpolator(time, values, method="makima")
+
+
+def _fit(axes: Axes, reach: Array) -> None:
+    """Show as much as lies within ``reach`` (2,) of the origin, with equal scales, and fill the axes."""
+    shape = np.array(axes.bbox.size)
+    x, y = shape * (reach / shape).max()
+    axes.set(xlim=(-x, x), ylim=(-y, y))
+
+
+def _draw_flow(axes: Axes, gradient: Array) -> None:
+    """Draw the imposed velocity relative to the vesicles' mean, faintly, wherever the axes show."""
+    x, y = (np.array(limits) for limits in (axes.get_xlim(), axes.get_ylim()))
+    spacing = max(np.ptp(x), np.ptp(y)) / _ARROWS
+    at = np.meshgrid(*(_inner(limits, spacing) for limits in (x, y)))
+    velocity = np.tensordot(gradient, at, axes=1)
+    fastest = np.hypot(*velocity).max()
+    axes.quiver(
+        *at,
+        *velocity * (0.9 * spacing / fastest),
+        angles="xy",
+        scale_units="xy",
+        scale=1,
+        pivot="middle",
+        color=GRAY,
+        alpha=0.35,
+        width=0.004,
+        zorder=0.5,
+        label="imposed flow",
+    )
+
+
+def _inner(limits: Array, spacing: float) -> Array:
+    """Multiples of the spacing between the limits, not at their very edge."""
+    most = np.floor((limits[1] - spacing / 2) / spacing)
+    return spacing * np.arange(-most, most + 1)
