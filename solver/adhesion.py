@@ -16,7 +16,7 @@ from solver import scene
 from solver.adhesion_kernels import adhesion_density, adhesion_energies, adhesion_hessians
 from solver.geometry import Geometry
 from solver.parallel import SERIAL, Parallel, Shares
-from solver.proximity import Closeness
+from solver.proximity import Proximity
 from solver.quadrature import required_ratio, trapezoid_error
 from solver.refinement import MAXIMUM_FACTOR, Refinement, sum_costs, within
 
@@ -49,7 +49,7 @@ class Adhesion:
         self._order = 0.5 * m + 1
         self.ratio = required_ratio(self._order, accuracy)
 
-    def density(self, geometry: Geometry, closeness: Closeness) -> Array:
+    def density(self, geometry: Geometry, closeness: Proximity) -> Array:
         """Force per length, (2, M, N)."""
         density = np.zeros_like(geometry.points)
         shares, arguments = self._share(geometry, closeness)
@@ -57,7 +57,7 @@ class Adhesion:
         own = density.reshape(2, -1)[:, shares.own]
         return shares.gather(own, axis=1).reshape(density.shape)
 
-    def jacobian(self, geometry: Geometry, closeness: Closeness) -> Array:
+    def jacobian(self, geometry: Geometry, closeness: Proximity) -> Array:
         """Derivative of `density` by the state, (2, M·N, state)."""
         membranes = geometry.membranes
         size = membranes.count * membranes.points
@@ -67,7 +67,7 @@ class Adhesion:
         own = hessian[:, shares.own]
         return shares.gather(geometry.by_state(membranes.fold(own)), axis=1)
 
-    def _share(self, geometry: Geometry, closeness: Closeness) -> tuple[Shares, tuple[Any, ...]]:
+    def _share(self, geometry: Geometry, closeness: Proximity) -> tuple[Shares, tuple[Any, ...]]:
         """Which points are this rank's, and what the compiled sums of forces on them are given."""
         refinement = closeness.refinement(self.ratio)
         size = geometry.membranes.count * geometry.membranes.points
@@ -80,11 +80,11 @@ class Adhesion:
     def _sums(self, geometry: Geometry, refinement: Refinement) -> tuple[Any, ...]:
         return geometry.curve_points, geometry.membranes.curve_spacing, refinement, *self._potential
 
-    def sum_error(self, closeness: Closeness) -> float:
+    def sum_error(self, closeness: Proximity) -> float:
         """Relative error of the force between the closest membranes, refined as far as it goes."""
         return trapezoid_error(self._order, MAXIMUM_FACTOR * closeness.nearest)
 
-    def energy(self, geometry: Geometry, closeness: Closeness) -> float:
+    def energy(self, geometry: Geometry, closeness: Proximity) -> float:
         """∫∫ φ ds ds summed over all pairs."""
         energy = adhesion_energies(*self._sums(geometry, closeness.refinement(self.ratio)))
         return float(geometry.membranes.copies * self._hamaker * energy)

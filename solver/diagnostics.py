@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from solver import curve, scene
 from solver.contacts import CONTACT, cluster_sizes, clusters
-from solver.dynamics import Dynamics, Motion
+from solver.dynamics import Motion
+from solver.equation import EquationOfMotion
 from solver.geometry import Geometry, Membranes
 from solver.orbit import Orbit
 from solver.proximity import gap, waist_error
@@ -48,7 +49,7 @@ def state_rate(membranes: Membranes, change: Array, duration: float) -> float:
     return float(max(np.abs(turning).max(), np.abs(relative).max()) / duration)
 
 
-def measures(setting: scene.Scene, dynamics: Dynamics) -> dict[str, Measure]:
+def measures(setting: scene.Scene, dynamics: EquationOfMotion) -> dict[str, Measure]:
     """The diagnostics that a scene has, by the name of their series."""
     vesicles = independent_vesicles(setting)
     target_area = np.array([v.reduced_area * v.length**2 / (4 * np.pi) for v in vesicles])
@@ -97,7 +98,7 @@ def vesicle_measures(setting: scene.Scene) -> dict[str, VesicleMeasure]:
 class Recorder:
     """Collects diagnostics and frames."""
 
-    def __init__(self, setting: scene.Scene, dynamics: Dynamics, orbit: Orbit | None) -> None:
+    def __init__(self, setting: scene.Scene, dynamics: EquationOfMotion, orbit: Orbit | None) -> None:
         self._setting = setting
         self._dynamics = dynamics
         self._orbit = orbit
@@ -110,7 +111,7 @@ class Recorder:
         self._vesicle_values: dict[str, list[Array]] = {}
         self.spatial_error = 0.0
 
-    def continue_with(self, dynamics: Dynamics) -> None:
+    def continue_with(self, dynamics: EquationOfMotion) -> None:
         """Take states of the same membranes with more points from now on."""
         if self._previous:
             time, state = self._previous

@@ -21,7 +21,7 @@ from solver.flow import ImposedFlow, imposed_flow
 from solver.geometry import Geometry, Membranes
 from solver.gliding import glide, gliding_direction, gliding_speed, gliding_speed_by_curvature
 from solver.parallel import SERIAL, Parallel
-from solver.proximity import Closeness
+from solver.proximity import Closeness, Proximity
 from solver.scene import Numerics, Scene
 from solver.spectral import differentiation, highest_modes, integration
 from solver.stokes import SingleLayer
@@ -45,7 +45,7 @@ class Motion:
     """
 
     geometry: Geometry
-    closeness: Closeness | None
+    closeness: Proximity | None
     velocity: Array
     turning: Array
     tension: Array

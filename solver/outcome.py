@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from solver import curve
-from solver.dynamics import Dynamics
+from solver.equation import EquationOfMotion
 from solver.orbit import Orbit
 from solver.run import Outcome
 from solver.scene import Criteria, Extension, Scene, Shear, Trap
@@ -24,7 +24,7 @@ class History:
     """The run so far: recorded diagnostics by name, the last state and the line of centers (two vesicles)."""
 
     samples: Mapping[str, Sequence[float]]
-    dynamics: Dynamics
+    dynamics: EquationOfMotion
     orbit: Orbit | None
     state: np.ndarray
 

@@ -2,15 +2,27 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.geometry import Geometry
 from solver.kernels import pair_distances, waists
+from solver.neighbors import smallest_gap
 from solver.refinement import MAXIMUM_FACTOR, Refinement, group_targets
 from solver.spectral import interpolation, interpolations
 
 Array = NDArray[np.float64]
+
+
+class Proximity(Protocol):
+    """Which membranes are close to which: `Closeness`, or `neighbors.Neighbors` where there are many."""
+
+    nearest: float  # distance over spacing
+
+    def refinement(self, ratio: float) -> Refinement:
+        """The refinement that brings every target to ``ratio`` spacings of every source."""
 
 
 class Closeness:
@@ -56,6 +68,8 @@ def waist_error(geometry: Geometry) -> Array:
 def gap(geometry: Geometry, refinement: int = 4) -> float:
     """Smallest distance between two different membranes, seen at ``refinement`` times as many points."""
     membranes = geometry.membranes
+    if membranes.copies == 1:
+        return smallest_gap(geometry, refinement)
     matrix = interpolation(membranes.points, refinement).T
     distances = pair_distances(
         geometry.curve_points @ matrix,

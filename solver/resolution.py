@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from solver.adhesion import Adhesion
 from solver.dynamics import accuracy_of
 from solver.geometry import Geometry, Membranes
+from solver.neighbors import Neighbors
 from solver.proximity import Closeness, waist_error
 from solver.refinement import MAXIMUM_FACTOR
 from solver.scene import Scene
@@ -117,7 +118,9 @@ class AdaptiveResolution:
     def _apart(self, geometry: Geometry) -> bool:
         if self._least_distance == 0:
             return True
-        return Closeness(geometry).nearest >= self._least_distance
+        if geometry.membranes.copies > 1:
+            return Closeness(geometry).nearest >= self._least_distance
+        return Neighbors(geometry, self._least_distance).nearest >= self._least_distance
 
 
 def _rates(scene: Scene) -> Array:

@@ -80,6 +80,7 @@ class Work:
     wall_seconds: float
     smallest_step: float | None = None  # accepted, in time; None if none was taken
     points: int | None = None  # on each vesicle at the end; None in records from before it could change
+    tension_iterations: int | None = None  # None in records from before they were counted
 
 
 # Diagnostics by name, each of shape (time,) and sampled at `Series["time"]`.  Always present: time,

@@ -15,6 +15,9 @@ from solver.ellipses import overlapping_pair
 from solver.model import Model, NonNegative, Positive
 from solver.vesicle import Vesicle
 
+# Vesicles up to which matrices over all points are kept; measured: beyond, sums are faster (`suspension`).
+LARGEST_DENSE = 6
+
 __all__ = [
     "Adhesion",
     "Arrangement",
@@ -182,4 +185,25 @@ class Scene(Model):
     def _relaxed_pair(self) -> Self:
         if self.start.relaxed and len(self.vesicles) != 2:
             raise ValueError(f"start.relaxed needs exactly 2 vesicles, got {len(self.vesicles)}")
+        return self
+
+    @property
+    def many(self) -> bool:
+        """Whether sums serve the scene better than matrices over all points.
+
+        They know no viscosity contrast.
+        """
+        return len(self.vesicles) > LARGEST_DENSE and all(v.viscosity_contrast == 1 for v in self.vesicles)
+
+    @model_validator(mode="after")
+    def _options_of_many(self) -> Self:
+        if self.many and self.numerics.integrator == "rosenbrock":
+            raise ValueError(
+                f"numerics.integrator 'rosenbrock' takes at most {LARGEST_DENSE} vesicles, "
+                f"got {len(self.vesicles)}: it needs the exact Jacobian"
+            )
+        if self.many and self.adhesion and self.adhesion.cutoff is not None:
+            raise ValueError(
+                f"adhesion.cutoff takes at most {LARGEST_DENSE} vesicles, got {len(self.vesicles)}"
+            )
         return self

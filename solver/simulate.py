@@ -129,6 +129,7 @@ def simulate(
         rhs_evaluations=start.evaluations + stage.cost.evaluations,
         jacobian_evaluations=stage.cost.jacobians,
         factorizations=stage.cost.factorizations,
+        tension_iterations=stage.cost.tension_iterations,
         wall_seconds=clock.perf_counter() - began,
         smallest_step=progress.smallest_step,
         points=stage.membranes.points,

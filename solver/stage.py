@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.diagnostics import conserved_quantities
-from solver.dynamics import Dynamics
+from solver.equation import equation_of_motion
 from solver.geometry import Geometry, Membranes
 from solver.integrators import Integrator, Step, integrator_for
 from solver.parallel import Parallel
@@ -23,6 +23,7 @@ class Cost(NamedTuple):
     evaluations: int = 0
     jacobians: int = 0
     factorizations: int = 0
+    tension_iterations: int = 0
 
 
 class Stage:
@@ -39,7 +40,7 @@ class Stage:
     """
 
     def __init__(self, scene: Scene, before: Cost, parallel: Parallel) -> None:
-        self.dynamics = Dynamics.of(scene, parallel)
+        self.dynamics = equation_of_motion(scene, parallel)
         self._scene = scene
         self._before = before
         self._integrator: Integrator | None = None
@@ -60,6 +61,7 @@ class Stage:
             state,
             latest,
             time,
+            block_diagonal=self._scene.many,
         )
 
     def step(self) -> Step:
@@ -75,4 +77,5 @@ class Stage:
             self._before.evaluations + self.dynamics.evaluations,
             self._before.jacobians + (integrator.jacobian_evaluations if integrator else 0),
             self._before.factorizations + (integrator.factorizations if integrator else 0),
+            self._before.tension_iterations + self.dynamics.inextensibility.iterations,
         )

@@ -7,12 +7,15 @@ NDF modification; the Jacobian is kept until Newton's iteration slows down.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import BDF
+from scipy.sparse import csc_array
 
 from solver.integrators.base import Step, StepFailedError
+from solver.integrators.blocks import BlockDiagonal
 
 Array = NDArray[np.float64]
 
@@ -32,21 +35,20 @@ class BackwardDifferentiation:
     def __init__(
         self,
         rate: Callable[[Array], Array],
-        jacobian: Callable[[Array], Array],
+        jacobian: Callable[[Array], Any],
         state: Array,
         tolerance: float,
         end: float,
         start: float = 0.0,
     ) -> None:
         self._rate, self._jacobian = rate, jacobian
-        self._bdf = BDF(
-            self._rate_or_nan,
-            start,
-            state,
-            end,
+        self._bdf = self._formulas(
+            fun=self._rate_or_nan,
+            t0=start,
+            y0=state,
+            t_bound=end,
             rtol=100 * np.finfo(float).eps,  # the least that SciPy accepts; set to zero below
             atol=tolerance,
-            jac=self._jacobian_or_last,
         )
         self._bdf.rtol = 0.0
         self._bdf.newton_tol = _NEWTON_TOLERANCE
@@ -81,6 +83,10 @@ class BackwardDifferentiation:
             shortened=bool(bdf.t - start < 0.999 * min(intended, bdf.t_bound - start)),
         )
 
+    def _formulas(self, **arguments: Any) -> BDF:
+        """SciPy's solver, with the Jacobian."""
+        return BDF(jac=self._jacobian_or_last, **arguments)
+
     def _predictor(self) -> Callable[[float], Array]:
         """The last step's interpolant, from which the formula extrapolates; at first a straight line."""
         if self._bdf.t_old is not None:
@@ -105,3 +111,36 @@ class BackwardDifferentiation:
                 raise
             last: Array = self._bdf.J
             return last
+
+
+class BlockBackwardDifferentiation(BackwardDifferentiation):
+    """The same with a block-diagonal Jacobian.
+
+    What it lacks only slows Newton's iteration, which stops at the same error.
+    """
+
+    def _formulas(self, **arguments: Any) -> BDF:
+        state = arguments["y0"]
+        # SciPy stores and inverts I − c·J by what it is given here; it knows dense and sparse matrices only.
+        bdf = BDF(jac=csc_array((len(state), len(state))), **arguments)
+        first: BlockDiagonal = self._jacobian(state)
+        members = first.members
+
+        def jacobian(_: float, state: Array) -> Array:
+            bdf.njev += 1
+            try:
+                return self._jacobian(state).blocks
+            except ArithmeticError:
+                return bdf.J
+
+        def invert(blocks: Array) -> Array:
+            bdf.nlu += 1
+            return np.asarray(np.linalg.inv(blocks))
+
+        def solve(inverses: Array, right: Array) -> Array:
+            return BlockDiagonal(inverses, members) @ right
+
+        bdf.njev = 1
+        bdf.I, bdf.J = np.eye(members.shape[1]), first.blocks
+        bdf.jac, bdf.lu, bdf.solve_lu = jacobian, invert, solve
+        return bdf

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.integrators.base import Integrator
-from solver.integrators.bdf import BackwardDifferentiation
+from solver.integrators.bdf import BackwardDifferentiation, BlockBackwardDifferentiation
+from solver.integrators.blocks import BlockDiagonal
 from solver.integrators.control import AdaptiveStep, ConservedError, EmbeddedError, ErrorMeasure
 from solver.integrators.one_step import OneStepIntegrator, OneStepMethod
 from solver.integrators.rodas5p import RODAS5P
@@ -35,11 +36,12 @@ def integrator_for(
     numerics: Numerics,
     vesicles: int,
     rate: Callable[[Array], Array],
-    jacobian: Callable[[Array], Array],
+    jacobian: Callable[[Array], Array] | Callable[[Array], BlockDiagonal],
     conserved: Callable[[Array], Array],
     state: Array,
     end: float,
     start: float = 0.0,
+    block_diagonal: bool = False,
 ) -> Integrator:
     """The integrator that ``numerics`` asks for.
 
@@ -49,7 +51,8 @@ def integrator_for(
     vesicles : int
         How many are in the fluid; it decides what "auto" is.
     rate, jacobian : callable
-        From a state (n,) to its rate of change (n,), and to the derivative of that, (n, n).
+        From a state (n,) to its rate of change (n,), and to the derivative of that, (n, n); with
+        ``block_diagonal`` to a `BlockDiagonal` that is close to it, which "rosenbrock" does not take.
     conserved : callable
         From a state to quantities of order 1 that the exact motion keeps, for the step control by them.
     state : (n,)
@@ -60,7 +63,8 @@ def integrator_for(
     """
     integrator = usual_integrator(vesicles) if numerics.integrator == "auto" else numerics.integrator
     if integrator == "bdf":
-        return BackwardDifferentiation(rate, jacobian, state, numerics.tolerance, end, start)
+        formulas = BlockBackwardDifferentiation if block_diagonal else BackwardDifferentiation
+        return formulas(rate, jacobian, state, numerics.tolerance, end, start)
     method: OneStepMethod
     measure: ErrorMeasure
     if integrator == "rosenbrock":

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.linalg import lu_factor, lu_solve
 
 from solver.integrators.base import Step, StepFailedError
+from solver.integrators.blocks import BlockDiagonal
 from solver.integrators.control import Attempt, StepControl, root_mean_square
 
 Array = NDArray[np.float64]
@@ -24,11 +25,13 @@ class Linearization:
         From a state (n,) to its rate of change (n,).
     state, slope : (n,)
         Where the step begins, and the rate there.
-    jacobian : (n, n)
+    jacobian : (n, n) or BlockDiagonal
         The derivative of the rate there.
     """
 
-    def __init__(self, rate: Callable[[Array], Array], state: Array, slope: Array, jacobian: Array) -> None:
+    def __init__(
+        self, rate: Callable[[Array], Array], state: Array, slope: Array, jacobian: Array | BlockDiagonal
+    ) -> None:
         self._rate = rate
         self.state = state
         self.slope = slope
@@ -53,6 +56,8 @@ class Linearization:
     def solver(self, duration: float) -> Callable[[Array], Array]:
         """Solve (I − duration·jacobian) x = b, from b (n,) to x (n,)."""
         self.factorizations += 1
+        if isinstance(self.jacobian, BlockDiagonal):
+            return self.jacobian.solver(duration)
         matrix = np.eye(len(self.state)) - duration * self.jacobian
         factors = lu_factor(matrix, overwrite_a=True, check_finite=False)
         return lambda right: np.asarray(lu_solve(factors, right, check_finite=False))
@@ -79,7 +84,7 @@ class OneStepIntegrator:
     method : OneStepMethod
     control : StepControl
     rate, jacobian : callable
-        From a state (n,) to its rate of change (n,), and to the derivative of that, (n, n).
+        From a state (n,) to its rate of change (n,), and to the derivative of that, (n, n) or BlockDiagonal.
     state : (n,)
         Where the first step begins.
     end, start : float
@@ -91,7 +96,7 @@ class OneStepIntegrator:
         method: OneStepMethod,
         control: StepControl,
         rate: Callable[[Array], Array],
-        jacobian: Callable[[Array], Array],
+        jacobian: Callable[[Array], Array] | Callable[[Array], BlockDiagonal],
         state: Array,
         end: float,
         start: float = 0.0,

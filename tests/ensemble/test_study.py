@@ -22,6 +22,8 @@ from solver.scene import Adhesion, Scene, Shear, Trap
 STUDIES = (
     "critical-extension-hamaker",
     "critical-extension-rate",
+    "critical-hamaker-reduced-area",
+    "critical-hamaker-short-range",
     "critical-hamaker",
     "critical-separation-rate",
 )

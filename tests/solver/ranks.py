@@ -12,10 +12,11 @@ from ensemble.mpi import abort_guard, world
 from solver.dynamics import Dynamics
 from solver.parallel import SERIAL, Parallel, Ranks
 from solver.run import Run
-from solver.scene import Numerics, Scene, Shear, Trap, Vesicle
+from solver.scene import LARGEST_DENSE, Numerics, Scene, Shear, Trap, Vesicle
 from solver.simulate import simulate
 from solver.start import placed_state
 from tests.solver.scenes import shear_pair, uneven_pair
+from tests.solver.suspensions import suspension
 
 Array = NDArray[np.float64]
 
@@ -28,6 +29,7 @@ SCENES = {
         vesicles=(Vesicle(center=(-0.8, 0.0)), Vesicle(length=5.0, center=(0.6, 0.0), angle=1.4)),
     ),
 }
+MANY = suspension(LARGEST_DENSE + 1, horizon=0.2)
 DOUBLET = shear_pair(3.5, numerics=Numerics(points=32, tolerance=1e-3))
 
 
@@ -50,6 +52,7 @@ def computed(parallel: Parallel) -> dict[str, Array]:
     found = {}
     for name, scene in SCENES.items():
         found[f"{name} rate"], found[f"{name} jacobian"] = linearized(scene, parallel)
+    found["many"] = summary(simulate(MANY, parallel=parallel))
     found["doublet"] = summary(simulate(DOUBLET, parallel=parallel))
     return found
 

@@ -19,8 +19,13 @@ _QUANTILES = (0.02, 0.98)  # of the tensions after the start: an ellipse that ha
 
 
 @matplotlib.rc_context(STYLE)
-def filmstrip(runs: Mapping[str, Run], times: Sequence[float], reach: float = 2.6) -> Figure:
-    """Draw each run at these times, or as close to them as it was recorded, colored by tension.
+def filmstrip(
+    runs: Mapping[str, Run],
+    times: Sequence[float] = (),
+    shares: Sequence[float] = (),
+    reach: float = 2.6,
+) -> Figure:
+    """Draw each run at some times, or as close to them as it was recorded, colored by tension.
 
     Parameters
     ----------
@@ -28,18 +33,21 @@ def filmstrip(runs: Mapping[str, Run], times: Sequence[float], reach: float = 2.
         A row each.
     times : sequence of float
         A column each; left out where a run has ended before.
+    shares : sequence of float
+        Instead: the shares of each run's own time.
     reach : float
         Half the side of a panel, in the unit of length.  Panels are centered on the vesicles; a square
         marks the origin (the stagnation point) where it is in sight.
     """
     tensions = np.concatenate([run.frames.tension[1:].ravel() for run in runs.values()])
     scale = Normalize(*np.nanquantile(tensions, _QUANTILES))
-    panel = WIDTH / len(times)
+    columns = len(times or shares)
+    panel = WIDTH / columns
     figure = Figure(figsize=(WIDTH, panel * len(runs) + 0.8), layout="constrained")
-    panels = figure.subplots(len(runs), len(times), squeeze=False)
+    panels = figure.subplots(len(runs), columns, squeeze=False)
     lines = None
     for row, (title, run) in zip(panels, runs.items(), strict=True):
-        for axes, time in zip(row, times, strict=True):
+        for axes, time in zip(row, times or [share * run.time for share in shares], strict=True):
             axes.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal")
             axes.set_axis_off()
             if time > run.time + run.scene.output.frame_interval:

@@ -1,4 +1,4 @@
-"""Power laws through computed values, with what they leave uncertain."""
+"""Power laws and lines through computed values, with what they leave uncertain."""
 
 from __future__ import annotations
 
@@ -41,3 +41,38 @@ def power_law(x: Sequence[float], values: Sequence[float]) -> PowerLaw:
     line = linregress(np.log(x), np.log(values))
     quantile = t.ppf((1 + _CONFIDENCE) / 2, len(x) - 2)
     return PowerLaw(float(np.exp(line.intercept)), float(line.slope), float(quantile * line.stderr))
+
+
+@dataclass(frozen=True)
+class Line:
+    """value = intercept + slope · x; the errors are half the 95% confidence intervals."""
+
+    intercept: float
+    slope: float
+    intercept_error: float
+    slope_error: float
+
+
+def straight_line(x: Sequence[float], values: Sequence[float]) -> Line:
+    """Fit a straight line by least squares.
+
+    Parameters
+    ----------
+    x, values : sequence of float
+        At least three: two lie on a line whatever the physics.
+
+    Raises
+    ------
+    ValueError
+        If there are fewer.
+    """
+    if len(x) < 3:
+        raise ValueError(f"a line needs at least 3 values, got {len(x)}")
+    line = linregress(x, values)
+    quantile = t.ppf((1 + _CONFIDENCE) / 2, len(x) - 2)
+    return Line(
+        float(line.intercept),
+        float(line.slope),
+        float(quantile * line.intercept_stderr),
+        float(quantile * line.stderr),
+    )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from ensemble.boundary import Boundary, BoundaryPoint
 from ensemble.record import RunSummary
 from ensemble.report.paper.case import Case, StudyCase
+from ensemble.report.paper.comparison import Bracket
 from ensemble.store import Store
 from solver.run import Outcome, Run
 
@@ -39,6 +40,15 @@ class Results:
     def boundary(self, case: StudyCase) -> Boundary:
         """The boundary of a study."""
         return self._store.boundary(case.study.key)
+
+    def brackets(self, case: StudyCase) -> dict[float, Bracket]:
+        """The closed brackets of a study's boundary by the value of the sweep, in ascending order."""
+        found: dict[float, Bracket] = {}
+        for at, point in sorted(self.points(case).items()):
+            low, high = point.bracket
+            if low is not None and high is not None:
+                found[at] = (low, high)
+        return found
 
     def points(self, case: StudyCase) -> dict[float, BoundaryPoint]:
         """The points of a study's boundary by the value of the sweep."""

@@ -5,10 +5,30 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from ensemble.report.paper import doublets, draining, extension
+from ensemble.report.paper import (
+    critical_hamaker,
+    doublets,
+    draining,
+    exponents,
+    extension,
+    shear,
+    trap,
+    unequal,
+    viscosity,
+)
 from ensemble.report.paper.section import Section
 
-SECTIONS: Final[tuple[Section, ...]] = (draining.SECTION, doublets.SECTION, extension.SECTION)
+SECTIONS: Final[tuple[Section, ...]] = (
+    draining.SECTION,
+    doublets.SECTION,
+    extension.SECTION,
+    trap.SECTION,
+    shear.SECTION,
+    critical_hamaker.SECTION,
+    viscosity.SECTION,
+    exponents.SECTION,
+    unequal.SECTION,
+)
 
 
 def chosen(names: Sequence[str]) -> tuple[Section, ...]:

@@ -1,0 +1,159 @@
+"""The equation of motion of many vesicles; see `solver.dynamics`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.bending import Bending
+from solver.dynamics import Dynamics, Motion, accuracy_of, state_change
+from solver.flow import ImposedFlow, imposed_flow
+from solver.geometry import Geometry, Membranes
+from solver.integrators.blocks import BlockDiagonal
+from solver.neighbors import Neighbors
+from solver.parallel import Parallel
+from solver.scene import Scene
+from solver.suspension.adhesion import SummedAdhesion
+from solver.suspension.single_layer import SummedSingleLayer
+from solver.suspension.tension import Preconditioner, SummedInextensibility
+from solver.tension import Inextensibility
+
+Array = NDArray[np.float64]
+
+
+@dataclass
+class Suspension:
+    """Right-hand side of the equation of motion, and its Jacobian without what vesicles do to each other.
+
+    ``adhesion`` and ``flow`` are None for a scene without.
+    """
+
+    scene: Scene
+    parallel: Parallel
+    membranes: Membranes
+    bending: Bending
+    adhesion: SummedAdhesion | None
+    flow: ImposedFlow | None
+    inextensibility: SummedInextensibility
+    layer: SummedSingleLayer
+    evaluations: int = field(default=0, init=False)
+    _preconditioner: Preconditioner | None = field(default=None, init=False)
+    _last: Motion | None = field(default=None, init=False)
+
+    @classmethod
+    def of(cls, scene: Scene, parallel: Parallel) -> Self:
+        """The terms of a scene, computed together by these ranks."""
+        membranes = Membranes.of_scene(scene)
+        accuracy = accuracy_of(scene.numerics)
+        return cls(
+            scene=scene,
+            parallel=parallel,
+            membranes=membranes,
+            bending=Bending(),
+            adhesion=SummedAdhesion(scene.adhesion, accuracy, parallel) if scene.adhesion else None,
+            flow=imposed_flow(scene.flow, membranes) if scene.flow else None,
+            inextensibility=SummedInextensibility(accuracy),
+            layer=SummedSingleLayer(membranes, accuracy, parallel),
+        )
+
+    @property
+    def reach(self) -> float:
+        """Distance over spacing within which a term sees the points of a vesicle refined."""
+        return max(self.layer.ratio, self.adhesion.ratio if self.adhesion else 0.0)
+
+    def motion(self, state: Array) -> Motion:
+        """Velocity, tension and forces in a state."""
+        self.evaluations += 1
+        geometry = Geometry(self.membranes, state)
+        neighbors = Neighbors(geometry, self.reach)
+        self.layer.assemble(geometry, neighbors)
+        if self._preconditioner is None:
+            self._preconditioner = self._precondition(geometry)
+        bending = self.bending.density(geometry)
+        density, adhesion = bending, None
+        if self.adhesion:
+            adhesion = self.adhesion.density(geometry, neighbors)
+            density = bending + adhesion
+        free = self.inextensibility.solve(
+            self.layer,
+            geometry,
+            self._preconditioner,
+            density * self.membranes.spacing[:, None],
+            self.flow.velocity(geometry) if self.flow else None,
+        )
+        self._last = Motion(geometry, neighbors, free.velocity, free.turning, free.tension, bending, adhesion)
+        return self._last
+
+    def rate(self, state: Array) -> Array:
+        """d(state)/dt; see `Dynamics.rate`."""
+        return state_change(self.motion(state))
+
+    def rate_of(self, motion: Motion) -> Array:
+        """`rate` in the state of a motion."""
+        return state_change(motion)
+
+    def jacobian(self, state: Array) -> BlockDiagonal:
+        """Each vesicle's part of `rate` by its own part of the state, while the others rest.
+
+        It is that of the last state whose motion was found: an implicit step asks for it close to that one.
+        """
+        motion = self._last or self.motion(state)
+        assert motion.closeness is not None
+        count, points = self.membranes.count, self.membranes.points
+        stiffness = self.adhesion.stiffness(motion.geometry, motion.closeness) if self.adhesion else None
+        shares = self.parallel.divide(count)
+        own = range(count)[shares.own]
+        blocks = np.empty((len(own), points + 2, points + 2))
+        inverses, shifts = np.empty((len(own), points, points)), np.empty(len(own))
+        for k, vesicle in enumerate(own):
+            alone, geometry = self._alone(motion.geometry, vesicle)
+            part = slice(vesicle, vesicle + 1)
+            among_others = Motion(
+                geometry,
+                None,
+                motion.velocity[:, part],
+                motion.turning[part],
+                motion.tension[part],
+                motion.bending[:, part],
+                None if motion.adhesion is None else motion.adhesion[:, part],
+            )
+            by_state = alone.point_derivatives(geometry)
+            drawn = None if stiffness is None else _drawn(stiffness[:, vesicle], by_state)
+            carried = alone.flow.jacobian(by_state) if alone.flow else None
+            blocks[k] = alone.linearized(among_others, drawn, carried)
+            inverses[k], shifts[k] = alone.inextensibility.inverse, alone.inextensibility.shift
+        self._preconditioner = Preconditioner(shares.gather(inverses), shares.gather(shifts))
+        angles = np.arange(count * points).reshape(count, points)
+        centers = count * points + np.arange(2 * count).reshape(2, count).T
+        return BlockDiagonal(shares.gather(blocks), np.concatenate([angles, centers], axis=1))
+
+    def _precondition(self, geometry: Geometry) -> Preconditioner:
+        count, points = self.membranes.count, self.membranes.points
+        shares = self.parallel.divide(count)
+        own = range(count)[shares.own]
+        inverses, shifts = np.empty((len(own), points, points)), np.empty(len(own))
+        for k, vesicle in enumerate(own):
+            alone, _ = self._alone(geometry, vesicle)
+            alone.inextensibility.factorize(alone.layer, _)
+            inverses[k], shifts[k] = alone.inextensibility.inverse, alone.inextensibility.shift
+        return Preconditioner(shares.gather(inverses), shares.gather(shifts))
+
+    def _alone(self, geometry: Geometry, vesicle: int) -> tuple[Dynamics, Geometry]:
+        """A vesicle as if it were alone in the flow, its single layer assembled."""
+        scene = self.scene.model_copy(update={"vesicles": (self.scene.vesicles[vesicle],), "adhesion": None})
+        accuracy = accuracy_of(scene.numerics)
+        alone = replace(Dynamics.of(scene), inextensibility=Inextensibility(accuracy, 1e-3 * accuracy))
+        state = np.concatenate([geometry.tangent_angle[vesicle], geometry.centers[:, vesicle]])
+        own = Geometry(alone.membranes, state)
+        alone.layer.assemble(own, None)
+        return alone, own
+
+
+def _drawn(stiffness: Array, by_state: Array) -> Array:
+    """Derivatives of the force on each point by the state, (2, N, state), from those by the point, (3, N)."""
+    xx, xy, yy = stiffness[:, :, None]
+    x, y = by_state
+    return np.stack([xx * x + xy * y, xy * x + yy * y])
