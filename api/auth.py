@@ -2,33 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from http import HTTPStatus
 from ipaddress import ip_address
 from typing import Annotated
 
 from fastapi import Depends, Request
-from fastapi.concurrency import run_in_threadpool
-from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
+from fastapi.openapi.models import HTTPBearer
+from fastapi.security.base import SecurityBase
+from fastapi.security.utils import get_authorization_scheme_param
 
 from api.problems import Problem
 from api.scope import Scope
-from api.service import ServiceOf
+from api.service import Service, service_of
 
 LOCAL_USER = "local"
 LOOPBACK_NAMES = {"localhost", "127.0.0.1", "::1"}
 
-bearer = HTTPBearer(auto_error=False, description="A token made by `ensemble token create`.")
-Bearer = Annotated[HTTPAuthorizationCredentials | None, Depends(bearer)]
-
 
 @dataclass(frozen=True)
-class Principal:
-    """Somebody whose request is answered."""
+class Caller:
+    """Somebody whose request is answered, and the service that answers."""
 
     user: str
     scope: Scope
+    service: Service
 
 
 def is_loopback(host: str) -> bool:
@@ -39,7 +37,30 @@ def is_loopback(host: str) -> bool:
         return host == "localhost"
 
 
-async def identify(request: Request, service: ServiceOf, credentials: Bearer) -> Principal:
+class Allowed(SecurityBase):
+    """The dependency that lets only those pass whose scope includes this one, at a bounded rate.
+
+    It is one and not a chain of several, as every request passes it: a link costs as much as a look-up.
+    """
+
+    def __init__(self, scope: Scope) -> None:
+        self.model = HTTPBearer(description="A token made by `ensemble token create`.")
+        self.scheme_name = "HTTPBearer"
+        self._scope = scope
+
+    async def __call__(self, request: Request) -> Caller:
+        """Say who asks."""
+        caller = await _identify(request, service_of(request))
+        if not caller.scope.includes(self._scope):
+            raise Problem(
+                HTTPStatus.FORBIDDEN,
+                f"Authorization: needs scope {self._scope}, the token has {caller.scope}",
+            )
+        await caller.service.limits.check_rate(caller.user)
+        return caller
+
+
+async def _identify(request: Request, service: Service) -> Caller:
     """Say who asks; a service without tokens answers whoever reaches it on this machine."""
     if not service.needs_tokens:
         # A page of another site that has its name point here would send that name.
@@ -47,38 +68,22 @@ async def identify(request: Request, service: ServiceOf, credentials: Bearer) ->
             raise Problem(
                 HTTPStatus.MISDIRECTED_REQUEST, "Host: this service answers to localhost and 127.0.0.1 only"
             )
-        return Principal(LOCAL_USER, Scope.ADMIN)
+        return Caller(LOCAL_USER, Scope.ADMIN, service)
     address = request.client.host if request.client else ""
     await service.limits.check_refusals(address)
-    token = None
-    if credentials is not None:
-        token = await run_in_threadpool(service.tokens.find, credentials.credentials)
+    kind, credentials = get_authorization_scheme_param(request.headers.get("Authorization"))
+    shown = kind.lower() == "bearer" and bool(credentials)
+    token = await service.look_up(service.tokens.find, credentials) if shown else None
     if token is None:
-        if credentials is not None:
+        if shown:
             await service.limits.count_refusal(address)
         raise Problem(
             HTTPStatus.UNAUTHORIZED,
             "Authorization: give a valid token as Bearer; it may be unknown or expired",
             headers={"WWW-Authenticate": "Bearer"},
         )
-    return Principal(token.user, token.scope)
+    return Caller(token.user, token.scope, service)
 
 
-def allowed(scope: Scope) -> Callable[..., Awaitable[Principal]]:
-    """Make the dependency that lets only those pass whose scope includes this one, at a bounded rate."""
-
-    async def pass_if_allowed(
-        service: ServiceOf, principal: Annotated[Principal, Depends(identify)]
-    ) -> Principal:
-        if not principal.scope.includes(scope):
-            raise Problem(
-                HTTPStatus.FORBIDDEN, f"Authorization: needs scope {scope}, the token has {principal.scope}"
-            )
-        await service.limits.check_rate(principal.user)
-        return principal
-
-    return pass_if_allowed
-
-
-Reader = Annotated[Principal, Depends(allowed(Scope.READ))]
-Submitter = Annotated[Principal, Depends(allowed(Scope.SUBMIT))]
+Reader = Annotated[Caller, Depends(Allowed(Scope.READ))]
+Submitter = Annotated[Caller, Depends(Allowed(Scope.SUBMIT))]

@@ -1,19 +1,21 @@
-"""What is computed from the points of a boundary: a line through them, and values between them."""
+"""What is read off the points of a boundary: a line through them, and values between them."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from api.schemas import BoundaryDocument, CriticalValueAt, Fit, Method
+from api.schemas import BoundaryDocument, CriticalValueAt, Method
 from ensemble.boundary import Boundary, BoundaryPoint
 from ensemble.errors import BadInput
+from ensemble.line import line_through
 from ensemble.search import Status
 
-FEWEST_TO_FIT = 3  # two points lie on a line whatever the physics
+MOST_FITTED = 256  # boundaries that are kept as they were sent
 
 
 @dataclass(frozen=True)
@@ -39,19 +41,12 @@ def _known(boundary: Boundary) -> list[_Known]:
     return sorted(points, key=lambda known: known.at)
 
 
-def boundary_document(boundary: Boundary) -> BoundaryDocument:
-    """Add to a boundary what is computed from its points."""
-    return BoundaryDocument.model_validate(boundary.model_dump() | {"fit": fit(boundary)})
-
-
-def fit(boundary: Boundary) -> Fit | None:
-    """Fit a straight line to the converged points, if there are three or more."""
-    known = _known(boundary)
-    if len(known) < FEWEST_TO_FIT:
-        return None
-    line = Polynomial.fit([point.at for point in known], [point.value for point in known], deg=1)
-    intercept, slope = line.convert().coef
-    return Fit(intercept=float(intercept), slope=float(slope))
+@lru_cache(MOST_FITTED)
+def fitted(recorded: str) -> str:
+    """Add to the JSON of a boundary the line through its points."""
+    boundary = Boundary.model_validate_json(recorded)
+    document = BoundaryDocument.model_validate(boundary.model_dump() | {"fit": line_through(boundary)})
+    return document.model_dump_json()
 
 
 def critical_value_at(boundary: Boundary, parameters: Mapping[str, float], method: Method) -> CriticalValueAt:

@@ -26,9 +26,9 @@ def etag(*parts: str) -> str:
     return f'"{hashlib.sha256("/".join(parts).encode()).hexdigest()[:32]}"'
 
 
-def written(document: BaseModel) -> Response:
+def written(document: BaseModel | str) -> Response:
     """Answer with a document as it is: it needs no second validation on its way out."""
-    return Response(document.model_dump_json(), media_type=JSON)
+    return Response(document if isinstance(document, str) else document.model_dump_json(), media_type=JSON)
 
 
 def cached(request: Request, tag: str, control: str, make: Callable[[], Response]) -> Response:

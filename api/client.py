@@ -8,9 +8,9 @@ with Client("http://127.0.0.1:8000") as client:
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager
 from functools import cached_property
-from types import TracebackType
-from typing import TYPE_CHECKING, Any, Final, Self
+from typing import TYPE_CHECKING, Any, Final
 from uuid import uuid4
 
 import httpx
@@ -141,7 +141,7 @@ class StoredRun:
         return rows[:, 0], rows[:, 1:].reshape(-1, vesicles, 3, points)
 
 
-class Client:
+class Client(AbstractContextManager["Client"]):
     """A service at an address.
 
     Use it as a context manager, or close it.  While the service cannot be reached, as while it is started
@@ -163,12 +163,7 @@ class Client:
         """Close the connections."""
         self._http.close()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def presets(self) -> list[Preset]:

@@ -6,32 +6,21 @@ import threading
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 from alembic import command
 from alembic.config import Config
-from sqlalchemy import Connection, Engine, create_engine, event, make_url
-from sqlalchemy.engine.interfaces import DBAPIConnection
-from sqlalchemy.exc import ArgumentError, DBAPIError, NoSuchModuleError
-from sqlalchemy.pool import ConnectionPoolEntry
+from sqlalchemy import Connection, Engine
 
 from ensemble.disk import locked
 from ensemble.errors import BadInput
+from ensemble.store.database import UNUSABLE, engine, reason
 
 MIGRATIONS = "api:migrations"
 LOCK = "database.lock"
-BUSY_SECONDS = 60
 
 
-def _durable(connection: DBAPIConnection, _: ConnectionPoolEntry) -> None:
-    cursor = connection.cursor()
-    cursor.execute("PRAGMA journal_mode=WAL")  # readers wait for no writer
-    cursor.execute("PRAGMA synchronous=FULL")  # an acknowledged commit outlives a power failure
-    cursor.close()
-
-
-class Database:
+class Database(AbstractContextManager["Database"]):
     """Connections to a database whose tables are up to date.  Get one from `Database.open`."""
 
     def __init__(self, engine: Engine) -> None:
@@ -57,14 +46,17 @@ class Database:
             If there is no such database or it cannot be used.
         """
         try:
-            database = cls(_engine(url))
+            database = cls(engine(url))
             with locked(directory / LOCK):
                 database._upgrade()
-        except (ArgumentError, NoSuchModuleError, ModuleNotFoundError) as error:
-            raise BadInput(f"database: {_first_line(error)}") from error
-        except DBAPIError as error:
-            raise BadInput(f"database: it cannot be used ({_first_line(error.orig)})") from error
+        except UNUSABLE as error:
+            raise BadInput(f"database: it cannot be used ({reason(error)})") from error
         return database
+
+    @property
+    def dialect(self) -> str:
+        """Which SQL it speaks, in SQLAlchemy's words."""
+        return self._engine.dialect.name
 
     def _upgrade(self) -> None:
         config = Config()
@@ -87,25 +79,5 @@ class Database:
         """Close all connections."""
         self._engine.dispose()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
-
-
-def _engine(url: str) -> Engine:
-    if make_url(url).get_backend_name() != "sqlite":
-        return create_engine(url, pool_pre_ping=True)
-    engine = create_engine(url, connect_args={"timeout": BUSY_SECONDS})
-    event.listen(engine, "connect", _durable)
-    return engine
-
-
-def _first_line(error: BaseException | None) -> str:
-    return str(error).splitlines()[0]

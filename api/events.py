@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator
 
-from fastapi.concurrency import run_in_threadpool
 from sse_starlette import ServerSentEvent
 
 from api.job import Job
@@ -17,7 +16,7 @@ async def job_events(service: Service, job: Job) -> AsyncIterator[ServerSentEven
     yield _event(job)
     while not job.status.finished:
         await asyncio.sleep(service.settings.event_seconds)
-        latest = await run_in_threadpool(service.jobs.get, job.id)
+        latest = await service.look_up(service.jobs.get, job.id)
         if latest != job:
             yield _event(latest)
         job = latest

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 SAFE_HEADERS = {
@@ -14,6 +13,7 @@ SAFE_HEADERS = {
     "X-Content-Type-Options": "nosniff",
     "X-Frame-Options": "DENY",
 }
+ENCODED = [(name.lower().encode(), value.encode()) for name, value in SAFE_HEADERS.items()]
 
 
 class SafeHeaders:
@@ -27,10 +27,11 @@ class SafeHeaders:
 
         async def send_with_headers(message: Message) -> None:
             if message["type"] == "http.response.start":
-                headers = MutableHeaders(scope=message)
-                for name, value in SAFE_HEADERS.items():
-                    headers.setdefault(name, value)  # the page has a policy of its own
-                headers.setdefault("Cache-Control", "no-store")
+                own = {name for name, _ in message["headers"]}  # the page has a policy of its own
+                message["headers"] = [
+                    *message["headers"],
+                    *(header for header in ENCODED if header[0] not in own),
+                ]
             await send(message)
 
         await self._app(scope, receive, send_with_headers)

@@ -16,22 +16,22 @@ from pathlib import Path
 from typing import Any
 
 from sqlalchemy import (
-    Connection,
     ScalarSelect,
     Update,
     bindparam,
     case,
     func,
-    insert,
     literal,
+    or_,
     select,
     update,
 )
-from sqlalchemy.exc import IntegrityError
 
 from api.database import Database
+from api.intake import Intake
 from api.job import UNFINISHED, IdempotencyConflict, Job, Lease, NoSuchJob, Status, TooManyJobs, Work
 from api.tables import JobRow
+from api.worker_name import has_died
 from ensemble.timestamp import now
 
 LEASE_SECONDS = 3.0
@@ -65,6 +65,7 @@ class Jobs:
 
     def __init__(self, database: Database, store: Path, clock: Callable[[], datetime] = now) -> None:
         self._database = database
+        self._intake = Intake(database)
         self._directory = store / LOGS
         self._clock = clock
 
@@ -123,7 +124,7 @@ class Jobs:
             "idempotency_key": idempotency_key,
             "fingerprint": fingerprint,
         }
-        if not self._insert(row, most_unfinished):
+        if not self._intake.add(row, most_unfinished):
             earlier = self._earlier(owner, idempotency_key, fingerprint)
             if earlier is None:
                 raise TooManyJobs(
@@ -131,17 +132,6 @@ class Jobs:
                 )
             return Submitted(earlier, new=False)
         return Submitted(job, new=True)
-
-    def _insert(self, row: dict[str, Any], most_unfinished: int | None) -> bool:
-        """Add a job unless its owner has too many, or its idempotency key is there already."""
-        try:
-            with self._database.begin() as connection:
-                if most_unfinished is not None and _unfinished(connection, row["owner"]) >= most_unfinished:
-                    return False
-                connection.execute(insert(JobRow), row)
-        except IntegrityError:
-            return False
-        return True
 
     def _earlier(self, owner: str, idempotency_key: str | None, fingerprint: str) -> Job | None:
         """Return the job that an idempotency key has made already."""
@@ -220,17 +210,13 @@ class Jobs:
         return self.get(identifier)
 
     def lease(self, worker: str) -> Lease | None:
-        """Take the next job for a worker; None if there is none, or another worker was faster.
+        """Take the next job for a worker, named by `api.worker_name`; None if there is none to be had.
 
         It is the oldest one of the owner who has the fewest running.  A job whose worker has let its lease
-        run out takes part again.
+        run out, or is seen to have died, takes part again.
         """
         moment = self._clock()
-        lost = (
-            update(JobRow)
-            .where(JobRow.status == Status.RUNNING, JobRow.expires < moment)
-            .values(_waiting("its worker was lost; waiting for another one", moment))
-        )
+        running = select(JobRow.worker).where(JobRow.status == Status.RUNNING)
         expires = moment + timedelta(seconds=LEASE_SECONDS)
         take = (
             update(JobRow)
@@ -247,6 +233,12 @@ class Jobs:
             .returning(*_SEEN, JobRow.document)
         )
         with self._database.begin() as connection:
+            dead = [name for name in connection.scalars(running) if name is not None and has_died(name)]
+            lost = (
+                update(JobRow)
+                .where(JobRow.status == Status.RUNNING, or_(JobRow.expires < moment, JobRow.worker.in_(dead)))
+                .values(_waiting("its worker was lost; waiting for another one", moment))
+            )
             connection.execute(lost)
             row = connection.execute(take).one_or_none()
         return None if row is None else Lease(Job.model_validate(row), row.document)
@@ -290,11 +282,6 @@ class Jobs:
 def _fingerprint(work: Work, ranks: int, seconds: float) -> str:
     request = json.dumps([work.name, work.document, ranks, seconds], sort_keys=True)
     return hashlib.sha256(request.encode()).hexdigest()
-
-
-def _unfinished(connection: Connection, owner: str) -> int:
-    query = select(func.count()).where(JobRow.owner == owner, JobRow.status.in_(UNFINISHED))
-    return connection.execute(query).scalar_one()
 
 
 def _number(identifier: str) -> ScalarSelect[int]:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import json
+from collections.abc import Sequence
 from typing import Annotated
 from urllib.parse import urlsplit
 
-from fastapi import Query, Request
+from fastapi import Query, Request, Response
 
-from api.schemas import Item, Page
+from api.caching import written
+from ensemble.store import Record
 
 Limit = Annotated[int, Query(ge=1, le=1000, description="How many elements at most.")]
 After = Annotated[
@@ -21,10 +23,15 @@ Where = Annotated[
 ]
 
 
-def page(request: Request, found: Sequence[Item], limit: int, key: Callable[[Item], str]) -> Page[Item]:
-    """Make a page of what was found when one more than `limit` was looked for."""
-    items = list(found[:limit])
-    if len(found) <= limit:
-        return Page(items=items, next=None)
-    following = urlsplit(str(request.url.include_query_params(after=key(items[-1]))))
-    return Page(items=items, next=f"{following.path}?{following.query}")
+def page(request: Request, found: Sequence[Record], limit: int) -> Response:
+    """Answer with a page of what was found when one more than `limit` was looked for.
+
+    The records are JSON already, so the page is put together from their text.
+    """
+    items = found[:limit]
+    following = None
+    if len(found) > limit:
+        parts = urlsplit(str(request.url.include_query_params(after=items[-1].key)))
+        following = f"{parts.path}?{parts.query}"
+    listed = ",".join(record.json for record in items)
+    return written(f'{{"items":[{listed}],"next":{json.dumps(following)}}}')

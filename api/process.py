@@ -9,9 +9,9 @@ import sys
 import tempfile
 import threading
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
-from types import TracebackType
-from typing import IO, Self, TextIO
+from typing import IO, TextIO
 
 from pydantic import ValidationError
 
@@ -37,7 +37,7 @@ def mpirun_command(ranks: int, arguments: Sequence[str]) -> list[str]:
     return [mpirun, "-n", str(ranks), sys.executable, "-P", "-m", "ensemble.cli", *arguments]
 
 
-class Process:
+class Process(AbstractContextManager["Process"]):
     """A command in its own session; neither it nor a descendant of it outlives this process.
 
     Use it as a context manager; leaving the block ends what is left.
@@ -89,15 +89,7 @@ class Process:
         self._watcher.stdin.close()
         self._watcher.wait()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.end()
         self._reader.join(_END_SECONDS)
         self._output.close()

@@ -9,6 +9,7 @@ from pydantic import BaseModel, Field, JsonValue, model_validator
 
 from api.job import Kind
 from ensemble.boundary import Boundary
+from ensemble.line import Line
 from ensemble.study import Study
 from solver.scene import Model, Scene
 
@@ -65,17 +66,10 @@ class Preset(BaseModel):
     estimate: Estimate
 
 
-class Fit(BaseModel):
-    """The straight line through the converged points: critical value = intercept + slope × parameter."""
-
-    intercept: float
-    slope: float
-
-
 class BoundaryDocument(Boundary):
     """A boundary, and the line through its converged points if there are three or more."""
 
-    fit: Fit | None
+    fit: Line | None
 
 
 class Method(StrEnum):

@@ -25,6 +25,7 @@ from api.settings import Settings
 from api.tokens import Tokens
 from ensemble.errors import BadInput
 from ensemble.store import Store
+from ensemble.store.database import Place, is_file
 
 THREADS = 8  # that read and write; more of them would only wait for each other
 RESTART_SECONDS = 1.0
@@ -67,6 +68,7 @@ def opened(settings: Settings) -> Iterator[Service]:
             tokens=tokens,
             limits=RateLimits(settings.request_rate, settings.refusal_rate),
             needs_tokens=bool(tokens.all()),
+            embedded=all(is_file(url) for url in (settings.database_url, Place.of(store.path).url)),
         )
 
 

@@ -9,9 +9,9 @@ from typing import Annotated
 from limits import parse
 from pydantic import AfterValidator, Field
 from pydantic_settings import BaseSettings, SettingsConfigDict
-from sqlalchemy import URL
 
 from ensemble.cli import DEFAULT_STORE
+from ensemble.store.database import Place, is_file, sqlite_url
 
 
 def _rate(text: str) -> str:
@@ -32,7 +32,7 @@ class Settings(BaseSettings):
     model_config = SettingsConfigDict(env_prefix="ENSEMBLE_", frozen=True, extra="ignore")
 
     store: Path = DEFAULT_STORE
-    database: str | None = None  # URL of the database of jobs and tokens
+    database: str | None = None  # URL of a server, as `ensemble.store.database` says
 
     maximum_ranks: int = Field(default_factory=lambda: os.cpu_count() or 1, ge=1)  # of a job
     maximum_seconds: float = Field(24 * 3600.0, gt=0)  # that a job may run
@@ -53,7 +53,12 @@ class Settings(BaseSettings):
 
     @property
     def database_url(self) -> str:
-        """URL of the database of jobs and tokens: an SQLite file in the store unless one is set."""
+        """URL of the database of jobs and tokens: an SQLite file in the store unless one is set.
+
+        A store that was made with a server for its catalog has them there, too.
+        """
         if self.database is not None:
             return self.database
-        return URL.create("sqlite", database=str(self.store.resolve() / JOBS_DATABASE)).render_as_string()
+        store = self.store.resolve()
+        catalog = Place.of(store).url
+        return sqlite_url(store / JOBS_DATABASE) if is_file(catalog) else catalog

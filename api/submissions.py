@@ -7,7 +7,6 @@ from http import HTTPStatus
 from typing import Annotated, Any
 
 from fastapi import Depends, Request
-from fastapi.concurrency import run_in_threadpool
 from pydantic import ValidationError
 from pydantic_core import from_json
 
@@ -20,16 +19,22 @@ from ensemble.overrides import override
 from ensemble.study import preset_document
 
 
-async def read_submission(request: Request) -> Submission:
-    """Read the body of a request, strictly: a word is no number, and neither is true or false."""
+async def body_of(request: Request) -> bytes:
+    """Return the body of a request, which says that it is JSON."""
     kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
     if kind != "application/json":
         raise Problem(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, f"Content-Type: {kind!r} — must be application/json")
-    # Not in the event loop: vesicles are compared pair by pair.
-    return await run_in_threadpool(_parse, await request.body())
+    return await request.body()
 
 
-def _parse(body: bytes) -> Submission:
+Body = Annotated[bytes, Depends(body_of)]
+
+
+def read_submission(body: bytes) -> Submission:
+    """Read a submission, strictly: a word is no number, and neither is true or false.
+
+    Not in the event loop, since vesicles are compared pair by pair.
+    """
     try:
         document = from_json(body)
         if isinstance(document, dict):
@@ -40,9 +45,6 @@ def _parse(body: bytes) -> Submission:
         raise invalid(error.errors(include_url=False)) from error
     except ValueError as error:
         raise BadInput(f"body: {error}") from error
-
-
-Submitted = Annotated[Submission, Depends(read_submission)]
 
 
 def requested(submission: Submission) -> Work:

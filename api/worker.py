@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import logging
-import os
-import socket
 import threading
 import time
 from collections.abc import Mapping
@@ -18,6 +16,7 @@ import tomli_w
 from api.job import Kind, Lease, Status
 from api.jobs import Jobs
 from api.process import Process, mpirun_command
+from api.worker_name import own_name
 
 POLL_SECONDS = 0.5
 HEARTBEAT_SECONDS = 0.5
@@ -51,7 +50,7 @@ class Worker:
     def __init__(self, jobs: Jobs, store: Path) -> None:
         self._jobs = jobs
         self._store = store
-        self._name = f"{socket.gethostname()}:{os.getpid()}"
+        self._name = own_name()
 
     def run(self, stop: threading.Event) -> None:
         """Work until `stop` is set; a job that is not finished by then is given back."""

@@ -7,12 +7,14 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+from tests import postgresql
 
 ENSEMBLE = (sys.executable, "-m", "ensemble.cli")
 SECONDS = 240
@@ -116,3 +118,13 @@ def finished_study(
     result = launcher.run(2, bisect_command(store))
     assert result.returncode == 0, result.stderr
     return Finished(store, json.loads(result.stdout), result.stderr)
+
+
+@pytest.fixture(scope="session")
+def postgresql_server() -> Iterator[postgresql.Server]:
+    """A PostgreSQL server."""
+    programs = postgresql.programs()
+    if programs is None:
+        pytest.skip("no PostgreSQL server: install the system's package")
+    with postgresql.running(programs) as server:
+        yield server

@@ -9,14 +9,13 @@ from fastapi import APIRouter, Path, Query, Request, Response
 from pydantic import FiniteFloat, TypeAdapter, ValidationError
 
 from api.auth import Reader
-from api.boundary import boundary_document, critical_value_at
+from api.boundary import critical_value_at, fitted
 from api.caching import ASK_AGAIN, NOT_MODIFIED, cached, etag, written
 from api.paging import After, Limit, Where, page
 from api.problems import documented
 from api.schemas import BoundaryDocument, CriticalValueAt, Method, Page
-from api.service import ServiceOf
 from ensemble.errors import BadInput
-from ensemble.timestamp import timestamp_text
+from ensemble.store import Record
 
 router = APIRouter(prefix="/boundaries", tags=["boundaries"])
 
@@ -38,39 +37,31 @@ PARAMETERS: dict[str, Any] = {
 }
 
 
-@router.get("")
+@router.get("", response_model=Page[BoundaryDocument])
 def list_boundaries(
     request: Request,
-    service: ServiceOf,
     reader: Reader,
     where: Where = [],  # noqa: B006  FastAPI copies it
     after: After = None,
     limit: Limit = 100,
-) -> Page[BoundaryDocument]:
+) -> Response:
     """List the boundaries that meet all conditions, by their keys."""
-    found = service.store.boundaries_page(where, after, limit + 1)
-    return page(
-        request, [boundary_document(boundary) for boundary in found], limit, key=lambda found: found.study_key
-    )
+    found = reader.service.store.boundaries_page(where, after, limit + 1)
+    return page(request, [Record(key, fitted(recorded)) for key, recorded in found], limit)
 
 
 @router.get(
     "/{key}", response_model=BoundaryDocument, responses=NOT_MODIFIED | documented(HTTPStatus.NOT_FOUND)
 )
-def get_boundary(request: Request, service: ServiceOf, reader: Reader, key: StudyKey) -> Response:
+async def get_boundary(request: Request, reader: Reader, key: StudyKey) -> Response:
     """Give a boundary as far as it is known: points, brackets, outcomes, and the line through them."""
-    boundary = service.store.boundary(key)
-
-    def make() -> Response:
-        return written(boundary_document(boundary))
-
-    return cached(request, etag(key, timestamp_text(boundary.updated)), ASK_AGAIN, make)
+    record = await reader.service.look_up(reader.service.store.boundary_record, key)
+    return cached(request, etag(record.json), ASK_AGAIN, lambda: written(fitted(record.json)))
 
 
 @router.get("/{key}/at", openapi_extra=PARAMETERS, responses=documented(HTTPStatus.NOT_FOUND))
 def get_critical_value(
     request: Request,
-    service: ServiceOf,
     reader: Reader,
     key: StudyKey,
     method: Annotated[
@@ -78,7 +69,7 @@ def get_critical_value(
     ] = Method.INTERPOLATED,
 ) -> CriticalValueAt:
     """Read a critical value off a boundary, with its uncertainty."""
-    boundary = service.store.boundary(key)
+    boundary = reader.service.store.boundary(key)
     given = {name: text for name, text in request.query_params.multi_items() if name != "method"}
     return critical_value_at(boundary, {name: _number(name, text) for name, text in given.items()}, method)
 

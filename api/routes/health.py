@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from http import HTTPStatus
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Request
 from sqlalchemy.exc import SQLAlchemyError
 
 from api.problems import Problem, documented
 from api.schemas import Health
-from api.service import ServiceOf
+from api.service import service_of
 
 router = APIRouter(tags=["health"])
 
@@ -21,8 +21,9 @@ async def alive() -> Health:
 
 
 @router.get("/readyz", responses=documented(HTTPStatus.SERVICE_UNAVAILABLE))
-def ready(service: ServiceOf) -> Health:
+def ready(request: Request) -> Health:
     """Answer if the store and the database of jobs can be read."""
+    service = service_of(request)
     try:
         service.jobs.counts()
         service.store.boundaries_page(limit=1)

@@ -7,7 +7,6 @@ from pathlib import Path as FilePath
 from typing import Annotated
 
 from fastapi import APIRouter, Header, Path, Query, Request, Response
-from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import PlainTextResponse
 from sse_starlette import EventSourceResponse
 
@@ -21,9 +20,10 @@ from api.paging import Limit, page
 from api.problems import Problem, documented
 from api.schemas import Estimate, Page, Submission
 from api.scope import Scope
-from api.service import Service, ServiceOf
-from api.submissions import Submitted, requested
+from api.service import Service
+from api.submissions import Body, read_submission, requested
 from ensemble.errors import BadInput
+from ensemble.store import Record
 from ensemble.study import Study
 
 router = APIRouter(tags=["jobs"])
@@ -36,23 +36,25 @@ NO_SUCH_JOB = documented(HTTPStatus.NOT_FOUND)
 
 
 @router.post("/estimate", openapi_extra=BODY, responses=UNSUPPORTED)
-def estimate_cost(service: ServiceOf, reader: Reader, submission: Submitted) -> Estimate:
+def estimate_cost(reader: Reader, body: Body) -> Estimate:
     """Say what a job may cost, without submitting it."""
-    return estimate(requested(submission).model, service.settings.maximum_cost)
+    return estimate(requested(read_submission(body)).model, reader.service.settings.maximum_cost)
 
 
-@router.post("/jobs", status_code=HTTPStatus.ACCEPTED, openapi_extra=BODY, responses=UNSUPPORTED)
+@router.post(
+    "/jobs", status_code=HTTPStatus.ACCEPTED, response_model=Job, openapi_extra=BODY, responses=UNSUPPORTED
+)
 def submit_job(
-    service: ServiceOf,
     submitter: Submitter,
-    submission: Submitted,
-    response: Response,
+    body: Body,
     idempotency_key: Annotated[
         str | None,
         Header(min_length=1, max_length=200, description="However often a request comes with it: one job."),
     ] = None,
-) -> Job:
+) -> Response:
     """Accept a job; it is on disk when this is answered."""
+    service = submitter.service
+    submission = read_submission(body)
     work = requested(submission)
     ranks, seconds = _resources(service, submission, isinstance(work.model, Study))
     cost = estimate(work.model, service.settings.maximum_cost)
@@ -70,8 +72,10 @@ def submit_job(
         )
     except TooManyJobs as error:
         raise Problem(HTTPStatus.TOO_MANY_REQUESTS, str(error)) from error
+    response = written(submitted.job)
+    response.status_code = HTTPStatus.ACCEPTED
     response.headers["Location"] = f"/jobs/{submitted.job.id}"
-    return submitted.job
+    return response
 
 
 def _resources(service: Service, submission: Submission, is_study: bool) -> tuple[int, float]:
@@ -88,7 +92,6 @@ def _resources(service: Service, submission: Submission, is_study: bool) -> tupl
 @router.get("/jobs", response_model=Page[Job])
 def list_jobs(
     request: Request,
-    service: ServiceOf,
     reader: Reader,
     owner: Annotated[str | None, Query(max_length=64)] = None,
     status: Status | None = None,
@@ -99,25 +102,25 @@ def list_jobs(
 ) -> Response:
     """List the jobs, the latest first."""
     try:
-        found = service.jobs.latest(limit + 1, after, owner, status)
+        found = reader.service.jobs.latest(limit + 1, after, owner, status)
     except NoSuchJob:
         raise BadInput(f"after: there is no job {after}") from None
-    return written(page(request, found, limit, key=lambda job: job.id))
+    return page(request, [Record(job.id, job.model_dump_json()) for job in found], limit)
 
 
 @router.get("/jobs/{identifier}", response_model=Job, responses=NO_SUCH_JOB)
-def get_job(service: ServiceOf, reader: Reader, identifier: JobKey) -> Response:
+async def get_job(reader: Reader, identifier: JobKey) -> Response:
     """Say where a job stands."""
-    return written(service.jobs.get(identifier))
+    return written(await reader.service.look_up(reader.service.jobs.get, identifier))
 
 
 @router.delete("/jobs/{identifier}", responses=NO_SUCH_JOB)
-def dismiss_job(service: ServiceOf, submitter: Submitter, identifier: JobKey) -> Job:
+def dismiss_job(submitter: Submitter, identifier: JobKey) -> Job:
     """Give a job up: no process of it is left a moment later.  A finished job stays as it is."""
-    owner = service.jobs.get(identifier).owner
+    owner = submitter.service.jobs.get(identifier).owner
     if submitter.user != owner and not submitter.scope.includes(Scope.ADMIN):
         raise Problem(HTTPStatus.FORBIDDEN, "Authorization: only its owner or an admin may dismiss a job")
-    return service.jobs.dismiss(identifier)
+    return submitter.service.jobs.dismiss(identifier)
 
 
 @router.get(
@@ -126,16 +129,17 @@ def dismiss_job(service: ServiceOf, submitter: Submitter, identifier: JobKey) ->
     responses=NO_SUCH_JOB
     | {HTTPStatus.OK.value: {"description": "Server-sent events.", "content": {"text/event-stream": {}}}},
 )
-async def listen_to_job(service: ServiceOf, reader: Reader, identifier: JobKey) -> EventSourceResponse:
+async def listen_to_job(reader: Reader, identifier: JobKey) -> EventSourceResponse:
     """Send the job as it is, and again each time it changes, until it has finished."""
-    job = await run_in_threadpool(service.jobs.get, identifier)
-    return EventSourceResponse(job_events(service, job))
+    job = await reader.service.look_up(reader.service.jobs.get, identifier)
+    return EventSourceResponse(job_events(reader.service, job))
 
 
 @router.get("/jobs/{identifier}/log", response_class=PlainTextResponse, responses=NO_SUCH_JOB)
-def get_log(service: ServiceOf, reader: Reader, identifier: JobKey) -> Response:
+def get_log(reader: Reader, identifier: JobKey) -> Response:
     """Give what the job's processes have said so far; of a long log the end."""
-    return PlainTextResponse(_tail(service.jobs.log_path(service.jobs.get(identifier))))
+    jobs = reader.service.jobs
+    return PlainTextResponse(_tail(jobs.log_path(jobs.get(identifier))))
 
 
 def _tail(path: FilePath) -> bytes:

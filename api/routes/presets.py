@@ -8,16 +8,17 @@ from api.auth import Reader
 from api.cost import estimate
 from api.job import preset_work
 from api.schemas import Page, Preset
-from api.service import ServiceOf
 from ensemble.study import preset_names
 
 router = APIRouter(prefix="/presets", tags=["presets"])
 
 
 @router.get("")
-def list_presets(service: ServiceOf, reader: Reader) -> Page[Preset]:
+def list_presets(reader: Reader) -> Page[Preset]:
     """List the presets, in full and with what they may cost."""
-    return Page(items=[_preset(name, service.settings.maximum_cost) for name in preset_names()], next=None)
+    return Page(
+        items=[_preset(name, reader.service.settings.maximum_cost) for name in preset_names()], next=None
+    )
 
 
 def _preset(name: str, maximum_cost: float) -> Preset:

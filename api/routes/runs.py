@@ -14,7 +14,6 @@ from api.paging import After, Limit, Where, page
 from api.problems import documented
 from api.schemas import FramesDocument, Page, SeriesDocument
 from api.series import series_document
-from api.service import ServiceOf
 from ensemble.record import RunSummary
 
 OCTETS = "application/octet-stream"
@@ -35,34 +34,28 @@ FRAMES: dict[int | str, dict[str, Any]] = {
 }
 
 
-@router.get("")
+@router.get("", response_model=Page[RunSummary])
 def list_runs(
     request: Request,
-    service: ServiceOf,
     reader: Reader,
     where: Where = [],  # noqa: B006  FastAPI copies it
     after: After = None,
     limit: Limit = 100,
-) -> Page[RunSummary]:
+) -> Response:
     """List the runs that meet all conditions, newest first."""
-    found = service.store.summaries_page(where, after, limit + 1)
-    return page(request, found, limit, key=lambda summary: summary.key)
+    return page(request, reader.service.store.runs_page(where, after, limit + 1), limit)
 
 
 @router.get("/{key}", response_model=RunSummary, responses=OF_A_RUN)
-def get_run(request: Request, service: ServiceOf, reader: Reader, key: RunKey) -> Response:
+async def get_run(request: Request, reader: Reader, key: RunKey) -> Response:
     """Give everything about a run except its arrays."""
-
-    def make() -> Response:
-        return written(service.store.summary(key))
-
-    return cached(request, etag(key), FOR_EVER, make)
+    record = await reader.service.look_up(reader.service.store.run_record, key)
+    return cached(request, etag(key), FOR_EVER, lambda: written(record.json))
 
 
 @router.get("/{key}/series", response_model=SeriesDocument, responses=OF_A_RUN)
 def get_series(
     request: Request,
-    service: ServiceOf,
     reader: Reader,
     key: RunKey,
     name: Annotated[list[str], Query(max_length=50, description="Diagnostics; all if left out.")] = [],  # noqa: B006
@@ -70,7 +63,7 @@ def get_series(
     """Give the diagnostics of a run over time."""
 
     def make() -> Response:
-        return written(series_document(service.store.load(key), name))
+        return written(series_document(reader.service.store.load(key), name))
 
     return cached(request, etag(key, "series", *sorted(name)), FOR_EVER, make)
 
@@ -78,7 +71,6 @@ def get_series(
 @router.get("/{key}/frames", response_model=FramesDocument, responses=OF_A_RUN | FRAMES)
 def get_frames(
     request: Request,
-    service: ServiceOf,
     reader: Reader,
     key: RunKey,
     start: Annotated[int, Query(ge=0, le=MOST_FRAMES, description="First frame.")] = 0,
@@ -89,8 +81,8 @@ def get_frames(
     octets = OCTETS in request.headers.get("accept", "")
 
     def make() -> Response:
-        run = service.store.load(key)
-        states = select_frames(run, start, stop, stride, service.settings.frame_values)
+        run = reader.service.store.load(key)
+        states = select_frames(run, start, stop, stride, reader.service.settings.frame_values)
         if octets:
             return Response(frames_bytes(states), media_type=OCTETS)
         return written(frames_document(states))

@@ -8,16 +8,14 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.polynomial import Polynomial
 
 from ensemble.boundary import Boundary, BoundaryPoint
 from ensemble.figures.style import BLACK, GRAY, MARKS, STYLE, WIDTH
 from ensemble.figures.symbols import Quantity, describe, quantity
+from ensemble.line import Line, line_through
 from ensemble.search import Status
 from solver.run import Array, Outcome
 from solver.scene import Scene
-
-_FEWEST_TO_FIT = 3  # two points lie on a line whatever the physics
 
 
 @matplotlib.rc_context(STYLE)
@@ -52,8 +50,8 @@ def phase_diagram(boundary: Boundary, runs: Sequence[tuple[float, float, Outcome
         _draw_brackets(axes, known, swept)
         _draw_boundary(axes, known, swept, y)
     converged = [point for point in known if point.status == Status.CONVERGED]
-    if len(converged) >= _FEWEST_TO_FIT:
-        _draw_fit(axes, converged, swept, x, y)
+    if (line := line_through(boundary)) is not None:
+        _draw_fit(axes, line, [point.parameters[swept] for point in converged], x, y)
     axes.margins(0.06)
     if axes.get_legend_handles_labels()[0]:
         figure.legend(loc="outside right center")
@@ -106,19 +104,16 @@ def _draw_boundary(axes: Axes, known: Sequence[BoundaryPoint], swept: str, y: Qu
     )
 
 
-def _draw_fit(axes: Axes, converged: Sequence[BoundaryPoint], swept: str, x: Quantity, y: Quantity) -> None:
-    sweep, critical = _critical_values(converged, swept)
-    line = Polynomial.fit(sweep, critical, deg=1)
-    intercept, slope = map(float, line.convert().coef)
-    sign = "−" if intercept < 0 else "+"
-    ends = np.array([sweep.min(), sweep.max()])
+def _draw_fit(axes: Axes, line: Line, sweep: Sequence[float], x: Quantity, y: Quantity) -> None:
+    sign = "−" if line.intercept < 0 else "+"
+    ends = np.array([min(sweep), max(sweep)])
     axes.plot(
         ends,
-        line(ends),
+        line.intercept + line.slope * ends,
         color=BLACK,
         linestyle=(0, (4, 3)),
         zorder=1.6,
-        label=f"fit, ${y.critical}$ = {slope:.3g} ${x.symbol}$ {sign} {abs(intercept):.2g}",
+        label=f"fit, ${y.critical}$ = {line.slope:.3g} ${x.symbol}$ {sign} {abs(line.intercept):.2g}",
         gid="fit",
     )
 

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from sqlalchemy import JSON, URL, Engine, bindparam, create_engine, event, select, tuple_
-from sqlalchemy.engine.interfaces import DBAPIConnection
-from sqlalchemy.orm import DeclarativeBase, Mapped, Session, mapped_column
-from sqlalchemy.pool import ConnectionPoolEntry
+from sqlalchemy import JSON, Executable, Text, bindparam, cast, delete, insert, select, tuple_
+from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
+from sqlalchemy.schema import CreateSchema
 
 from ensemble.boundary import Boundary
 from ensemble.record import RunSummary
+from ensemble.store.database import Place, engine
 from ensemble.store.filters import conditions, model_fields
 from ensemble.timestamp import timestamp_text
 from solver.scene import Scene
-
-BUSY_SECONDS = 60
 
 # A filter names a field of the scene or a result; both have names of their own.
 RUN_FIELDS = model_fields(Scene, "scene") | {
@@ -27,7 +24,7 @@ BOUNDARY_FIELDS = model_fields(Boundary)
 
 
 class Table(DeclarativeBase):
-    """Base of the tables."""
+    """Base of the tables.  They are what they have always been: what changes is in the documents."""
 
     type_annotation_map = {dict[str, Any]: JSON}  # noqa: RUF012
 
@@ -52,28 +49,37 @@ class BoundaryRow(Table):
     document: Mapped[dict[str, Any]]
 
 
+class Record(NamedTuple):
+    """A run or a boundary as it was recorded: its key, and the JSON of its summary or of itself.
+
+    What a later version has added to the models is not in it, which then means the default.
+    """
+
+    key: str
+    json: str
+
+
+# As text, since most of those who ask pass it on.
+_RUN = select(RunRow.key, cast(RunRow.document, Text))
+_BOUNDARY = select(BoundaryRow.study_key, cast(BoundaryRow.document, Text))
 # Made once: to make a statement takes longer than to answer it.
-_DOCUMENT = select(RunRow.document).where(RunRow.key == bindparam("key"))
-
-
-def _durable(connection: DBAPIConnection, _: ConnectionPoolEntry) -> None:
-    cursor = connection.cursor()
-    cursor.execute("PRAGMA journal_mode=WAL")  # readers see the store while a study writes
-    cursor.execute("PRAGMA synchronous=FULL")  # an acknowledged commit outlives a power failure
-    cursor.close()
+_ONE_RUN = _RUN.where(RunRow.key == bindparam("key"))
+_ONE_BOUNDARY = _BOUNDARY.where(BoundaryRow.study_key == bindparam("key"))
 
 
 class Catalog:
-    """Committed runs and boundaries in an SQLite file, from any thread."""
+    """Committed runs and boundaries in a database, from any thread."""
 
-    def __init__(self, path: Path) -> None:
-        url = URL.create("sqlite", database=str(path))
-        self._engine: Engine = create_engine(url, connect_args={"timeout": BUSY_SECONDS})
-        event.listen(self._engine, "connect", _durable)
+    def __init__(self, place: Place) -> None:
+        self._schema = place.schema_name
+        self._engine = engine(place.url).execution_options(schema_translate_map={None: place.schema_name})
 
     def create(self) -> None:
         """Create the tables that are not there yet."""
-        Table.metadata.create_all(self._engine)
+        with self._engine.begin() as connection:
+            if self._schema is not None:
+                connection.execute(CreateSchema(self._schema, if_not_exists=True))
+            Table.metadata.create_all(connection)
 
     def close(self) -> None:
         """Close all connections."""
@@ -81,72 +87,69 @@ class Catalog:
 
     def insert(self, summary: RunSummary) -> None:
         """Add a run; it exists from the moment that this returns."""
-        row = RunRow(key=summary.key, created=timestamp_text(summary.created), document=summary.document())
-        with Session(self._engine) as session, session.begin():
-            session.add(row)
+        row = {
+            "key": summary.key,
+            "created": timestamp_text(summary.created),
+            "document": summary.document(),
+        }
+        with self._engine.begin() as connection:
+            connection.execute(insert(RunRow), row)
 
     def keys(self) -> set[str]:
         """Keys of all runs."""
-        with Session(self._engine) as session:
-            return set(session.scalars(select(RunRow.key)))
+        with self._engine.connect() as connection:
+            return set(connection.scalars(select(RunRow.key)))
 
-    def document(self, key: str) -> dict[str, Any] | None:
-        """JSON of the summary of one run, None if there is no such run."""
-        with Session(self._engine) as session:
-            return session.scalar(_DOCUMENT, {"key": key})
+    def run(self, key: str) -> Record | None:
+        """One run, None if there is none of this key."""
+        return self._one(_ONE_RUN, key)
 
-    def summaries(self, where: Sequence[str]) -> list[RunSummary]:
-        """Summaries of the runs that meet all filters, oldest first."""
-        query = (
-            select(RunRow.document)
-            .where(*conditions(where, RunRow.document, RUN_FIELDS))
-            .order_by(RunRow.created, RunRow.key)
-        )
-        with Session(self._engine) as session:
-            return [RunSummary.model_validate(document) for document in session.scalars(query)]
+    def runs(self, where: Sequence[str]) -> list[Record]:
+        """Runs that meet all filters, oldest first."""
+        query = _RUN.where(*conditions(where, RunRow.document, RUN_FIELDS))
+        return self._all(query.order_by(RunRow.created, RunRow.key))
 
-    def summaries_page(self, where: Sequence[str], after: str | None, limit: int) -> list[RunSummary]:
-        """Summaries of at most `limit` runs, newest first, from the one that follows run `after`."""
-        query = select(RunRow.document).where(*conditions(where, RunRow.document, RUN_FIELDS))
+    def runs_page(self, where: Sequence[str], after: str | None, limit: int) -> list[Record]:
+        """At most `limit` runs, newest first, from the one that follows run `after`."""
+        query = _RUN.where(*conditions(where, RunRow.document, RUN_FIELDS))
         if after is not None:
             last = select(RunRow.created, RunRow.key).where(RunRow.key == after).scalar_subquery()
             query = query.where(tuple_(RunRow.created, RunRow.key) < last)
-        query = query.order_by(RunRow.created.desc(), RunRow.key.desc()).limit(limit)
-        with Session(self._engine) as session:
-            return [RunSummary.model_validate(document) for document in session.scalars(query)]
+        return self._all(query.order_by(RunRow.created.desc(), RunRow.key.desc()).limit(limit))
 
     def put_boundary(self, boundary: Boundary) -> None:
         """Insert a boundary, or replace the one of the same study."""
-        row = BoundaryRow(
-            study_key=boundary.study_key,
-            updated=timestamp_text(boundary.updated),
-            document=boundary.model_dump(mode="json"),
-        )
-        with Session(self._engine) as session, session.begin():
-            session.merge(row)
+        row = {
+            "study_key": boundary.study_key,
+            "updated": timestamp_text(boundary.updated),
+            "document": boundary.model_dump(mode="json"),
+        }
+        with self._engine.begin() as connection:
+            connection.execute(delete(BoundaryRow).where(BoundaryRow.study_key == boundary.study_key))
+            connection.execute(insert(BoundaryRow), row)
 
-    def boundaries(self, where: Sequence[str]) -> list[Boundary]:
-        """Boundaries that meet all filters, the longest unchanged first."""
-        query = (
-            select(BoundaryRow.document)
-            .where(*conditions(where, BoundaryRow.document, BOUNDARY_FIELDS))
-            .order_by(BoundaryRow.updated, BoundaryRow.study_key)
-        )
-        with Session(self._engine) as session:
-            return [Boundary.model_validate(document) for document in session.scalars(query)]
-
-    def boundary(self, study_key: str) -> Boundary | None:
+    def boundary(self, study_key: str) -> Record | None:
         """Boundary of one study, None if there is none."""
-        with Session(self._engine) as session:
-            row = session.get(BoundaryRow, study_key)
-            return None if row is None else Boundary.model_validate(row.document)
+        return self._one(_ONE_BOUNDARY, study_key)
 
-    def boundaries_page(self, where: Sequence[str], after: str | None, limit: int) -> list[Boundary]:
+    def boundaries(self, where: Sequence[str]) -> list[Record]:
+        """Boundaries that meet all filters, the longest unchanged first."""
+        query = _BOUNDARY.where(*conditions(where, BoundaryRow.document, BOUNDARY_FIELDS))
+        return self._all(query.order_by(BoundaryRow.updated, BoundaryRow.study_key))
+
+    def boundaries_page(self, where: Sequence[str], after: str | None, limit: int) -> list[Record]:
         """At most `limit` boundaries by ascending key, from the one that follows study `after`."""
         # By key and not by time: a boundary that changes while somebody turns pages stays in its place.
-        query = select(BoundaryRow.document).where(*conditions(where, BoundaryRow.document, BOUNDARY_FIELDS))
+        query = _BOUNDARY.where(*conditions(where, BoundaryRow.document, BOUNDARY_FIELDS))
         if after is not None:
             query = query.where(BoundaryRow.study_key > after)
-        query = query.order_by(BoundaryRow.study_key).limit(limit)
-        with Session(self._engine) as session:
-            return [Boundary.model_validate(document) for document in session.scalars(query)]
+        return self._all(query.order_by(BoundaryRow.study_key).limit(limit))
+
+    def _one(self, query: Executable, key: str) -> Record | None:
+        with self._engine.connect() as connection:
+            row = connection.execute(query, {"key": key}).one_or_none()
+        return None if row is None else Record(row[0], row[1])
+
+    def _all(self, query: Executable) -> list[Record]:
+        with self._engine.connect() as connection:
+            return [Record(key, json) for key, json in connection.execute(query)]

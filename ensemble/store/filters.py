@@ -11,8 +11,11 @@ from datetime import datetime
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from pydantic import BaseModel, TypeAdapter, ValidationError
-from sqlalchemy import ColumnElement, and_
+from sqlalchemy import ColumnElement, String, case, false
+from sqlalchemy.ext.compiler import compiles
 from sqlalchemy.orm import InstrumentedAttribute
+from sqlalchemy.sql.compiler import SQLCompiler
+from sqlalchemy.sql.functions import GenericFunction
 
 from ensemble.store.errors import StoreInputError
 from ensemble.timestamp import timestamp_text
@@ -27,8 +30,9 @@ COMPARISONS = {
 }
 EQUALITIES = ("=", "!=")
 PATTERN = re.compile(r"\s*(?P<path>\w+(?:\.\w+)*)\s*(?P<sign><=|>=|!=|=|<|>)\s*(?P<value>[^\s=<>].*?)\s*")
-# How a number that is not finite is written in a document; as text it would compare above every number.
-NON_FINITE = ("NaN", "Infinity", "-Infinity")
+# What databases call the types of JSON.
+NUMBERS = ("number", "integer", "real")
+BOOLEANS = ("boolean", "integer")  # SQLite takes 1 and 0 out of a document for true and false
 
 
 @dataclass(frozen=True)
@@ -98,6 +102,25 @@ def _is_sequence(annotation: Any) -> bool:
     return any(get_origin(kind) in (list, tuple) for kind in _alternatives(annotation))
 
 
+class json_type(GenericFunction[str]):  # noqa: N801  SQLAlchemy takes the name of the function from it
+    """Type of a JSON value, in the database's words."""
+
+    type = String()
+    inherit_cache = True
+
+
+@compiles(json_type, "postgresql")
+def _json_typeof(function: json_type, compiler: SQLCompiler, **options: Any) -> str:
+    return f"json_typeof({compiler.process(function.clauses, **options)})"
+
+
+def _of_kind(
+    element: ColumnElement[Any], kinds: Sequence[str], comparison: ColumnElement[bool]
+) -> ColumnElement[bool]:
+    """Compare values of these types, and no text that a server would fail to convert (such as "NaN")."""
+    return case((json_type(element).in_(kinds), comparison), else_=false())
+
+
 def _parse(text: str, path: str, annotation: Any) -> Any:
     try:
         return TypeAdapter(annotation).validate_strings(text)
@@ -149,7 +172,7 @@ def condition(text: str, document: InstrumentedAttribute[Any], fields: Fields) -
         If the filter is malformed, the field is unknown, or the value is none of its type.
     """
     match = PATTERN.fullmatch(text)
-    if match is None:
+    if match is None or "\0" in text:  # PostgreSQL knows no text with one
         raise StoreInputError(f"where: {text!r} is not of the form path op value, op one of = != < <= > >=")
     path, sign, value = match["path"], match["sign"], match["value"]
     field = _resolve(path, fields)
@@ -168,14 +191,13 @@ def condition(text: str, document: InstrumentedAttribute[Any], fields: Fields) -
     if numbers and value not in words:
         _parse(value, path, Union[tuple(numbers)])  # noqa: UP007
         # Compared as documents are, in double precision: SQL has no integers as long as Python's.
-        number = float(value)
-        return and_(compare(element.as_float(), number), element.as_string().not_in([*NON_FINITE, *words]))
+        return _of_kind(element, NUMBERS, compare(element.as_float(), float(value)))
     if kinds == {datetime}:
         return compare(element.as_string(), timestamp_text(_parse(value, path, datetime)))
     if sign not in EQUALITIES:
         raise StoreInputError(f"where: {path} is not a number and compares by = or != only")
     if kinds == {bool}:
-        return compare(element.as_boolean(), _parse(value, path, bool))
+        return _of_kind(element, BOOLEANS, compare(element.as_boolean(), _parse(value, path, bool)))
     return compare(element.as_string(), str(_parse(value, path, _joined(kinds))))
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager, closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 from pydantic import ValidationError
@@ -17,14 +18,16 @@ from ensemble.boundary import Boundary
 from ensemble.disk import flush, flush_tree, locked
 from ensemble.record import RunSummary
 from ensemble.store.archive import read_run, write_run
-from ensemble.store.catalog import Catalog
+from ensemble.store.catalog import Catalog, Record
 from ensemble.store.check import check_run
+from ensemble.store.database import CATALOG, PLACE, UNUSABLE, Place, reason
 from ensemble.store.errors import NotStored, StoreInputError
 from ensemble.store.staging import Writer, abandoned
 from solver.run import Outcome, Run
 
-CATALOG = "catalog.sqlite"
 LOCK = "store.lock"
+RUNS = "runs"
+STAGING = "staging"
 
 
 @dataclass(frozen=True)
@@ -40,7 +43,7 @@ class Staged:
         return self.summary.key
 
 
-class Store:
+class Store(AbstractContextManager["Store"]):
     """Runs and boundaries in a directory, for any number of processes and threads at once.
 
     Get one from `Store.open` or `Store.existing` and use it as a context manager.  A process that stages runs
@@ -55,27 +58,29 @@ class Store:
     def __init__(self, path: Path) -> None:
         # Resolved, so that a staged run means the same to a process in another working directory.
         self.path = path.resolve()
-        self._runs = self.path / "runs"
-        self._staging = self.path / "staging"
+        self._runs = self.path / RUNS
+        self._staging = self.path / STAGING
         self._lock = self.path / LOCK
-        self._catalog = Catalog(self.path / CATALOG)
+        self._catalog = Catalog(Place.of(self.path))
         self._writer = Writer(self._staging, self._lock)
 
     @classmethod
     def open(cls, path: Path) -> Self:
         """Open a store to write to: create it if there is none, and sweep it.
 
+        A new one has its catalog in a file, or on the server that `ensemble.store.database` tells of.
+
         Raises
         ------
         StoreInputError
-            If the path is a file, a directory with other contents, or cannot be created.
+            If the path is a file, a directory with other contents, or cannot be created, or if the database
+            cannot be used.
         """
-        store = cls(path)
-        try:
-            store._create()
+        if not _exists(path):
+            _create(path)
+        with _refused(path):
+            store = cls(path)
             store.sweep()
-        except (OSError, DatabaseError) as error:
-            raise StoreInputError(f"store: {path} cannot be opened ({error})") from error
         return store
 
     @classmethod
@@ -85,48 +90,21 @@ class Store:
         Raises
         ------
         StoreInputError
-            If there is no store at the path.
+            If there is no store at the path, or the database cannot be used.
         """
-        store = cls(path)
-        # Made last, so where it is the store is whole.
-        if not store._staging.is_dir():
+        if not _exists(path):
             raise StoreInputError(f"store: there is no store at {path}")
-        try:
+        with _refused(path):
+            store = cls(path)
             store._catalog.keys()
-        except DatabaseError as error:
-            raise StoreInputError(f"store: {path} cannot be opened ({error})") from error
         return store
-
-    def _create(self) -> None:
-        if self.path.exists() and not self.path.is_dir():
-            raise StoreInputError(f"store: {self.path} is a file; give a directory")
-        self.path.mkdir(parents=True, exist_ok=True)
-        # Sweeping removes what it does not know: a directory of anything else must never become a store.
-        foreign = {entry.name for entry in self.path.iterdir()} - {LOCK}
-        if foreign and not (self.path / CATALOG).exists():
-            raise StoreInputError(
-                f"store: {self.path} is no store and already holds {min(foreign)}; give a new directory"
-            )
-        with locked(self._lock):
-            self._catalog.create()
-            self._runs.mkdir(exist_ok=True)
-            self._staging.mkdir(exist_ok=True)
-            flush(self.path)
 
     def close(self) -> None:
         """Drop what this process staged and did not commit, and close the catalog."""
         self._writer.close()
         self._catalog.close()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def stage(self, run: Run) -> Staged:
@@ -171,12 +149,12 @@ class Store:
 
     def contains(self, key: str) -> bool:
         """Tell whether a run is committed."""
-        return self._catalog.document(key) is not None
+        return self._catalog.run(key) is not None
 
     def outcome(self, key: str) -> Outcome | None:
         """Outcome of a committed run, None if there is none."""
-        document = self._catalog.document(key)
-        return None if document is None else Outcome(document["outcome"])
+        record = self._catalog.run(key)
+        return None if record is None else Outcome(json.loads(record.json)["outcome"])
 
     def summary(self, key: str) -> RunSummary:
         """Everything about a committed run except its arrays.
@@ -186,10 +164,20 @@ class Store:
         NotStored
             If there is no such run.
         """
-        document = self._catalog.document(key)
-        if document is None:
+        return RunSummary.model_validate_json(self.run_record(key).json)
+
+    def run_record(self, key: str) -> Record:
+        """What `summary` reads, as it was recorded.
+
+        Raises
+        ------
+        NotStored
+            If there is no such run.
+        """
+        record = self._catalog.run(key)
+        if record is None:
             raise NotStored(f"run: there is no run {key} in {self.path}")
-        return RunSummary.model_validate(document)
+        return record
 
     def load(self, key: str) -> Run:
         """Read a committed run; every number has the bits that were saved.
@@ -219,12 +207,12 @@ class Store:
         StoreInputError
             If a filter is malformed, or its field or value is none.
         """
-        return self._catalog.summaries(where)
+        return [RunSummary.model_validate_json(record.json) for record in self._catalog.runs(where)]
 
-    def summaries_page(
+    def runs_page(
         self, where: Sequence[str] = (), after: str | None = None, limit: int = 100
-    ) -> list[RunSummary]:
-        """A part of what `summaries` finds, newest first.
+    ) -> list[Record]:
+        """A part of what `summaries` finds, newest first, as it was recorded.
 
         Parameters
         ----------
@@ -242,7 +230,7 @@ class Store:
         """
         if after is not None and not self.contains(after):
             raise StoreInputError(f"after: there is no run {after}")
-        return self._catalog.summaries_page(where, after, limit)
+        return self._catalog.runs_page(where, after, limit)
 
     def save_boundary(self, boundary: Boundary) -> None:
         """Insert a boundary, or replace the one of the same study, at once."""
@@ -257,7 +245,7 @@ class Store:
         StoreInputError
             If a filter is malformed, or its field or value is none.
         """
-        return self._catalog.boundaries(where)
+        return [Boundary.model_validate_json(record.json) for record in self._catalog.boundaries(where)]
 
     def boundary(self, study_key: str) -> Boundary:
         """Boundary of one study.
@@ -267,15 +255,25 @@ class Store:
         NotStored
             If there is none.
         """
-        boundary = self._catalog.boundary(study_key)
-        if boundary is None:
+        return Boundary.model_validate_json(self.boundary_record(study_key).json)
+
+    def boundary_record(self, study_key: str) -> Record:
+        """What `boundary` reads, as it was recorded.
+
+        Raises
+        ------
+        NotStored
+            If there is none.
+        """
+        record = self._catalog.boundary(study_key)
+        if record is None:
             raise NotStored(f"boundary: there is no boundary {study_key} in {self.path}")
-        return boundary
+        return record
 
     def boundaries_page(
         self, where: Sequence[str] = (), after: str | None = None, limit: int = 100
-    ) -> list[Boundary]:
-        """A part of what `boundaries` finds, by ascending key.
+    ) -> list[Record]:
+        """A part of what `boundaries` finds, by ascending key, as it was recorded.
 
         Parameters
         ----------
@@ -310,3 +308,38 @@ class Store:
         except (DatabaseError, ValidationError) as error:
             return [f"the catalog cannot be read ({error})"]
         return [problem for summary in summaries for problem in check_run(self._runs / summary.key, summary)]
+
+
+def _exists(path: Path) -> bool:
+    # Made last, so where it is the store is whole.
+    return (path / STAGING).is_dir()
+
+
+def _create(path: Path) -> None:
+    if path.exists() and not path.is_dir():
+        raise StoreInputError(f"store: {path} is a file; give a directory")
+    with _refused(path):
+        path.mkdir(parents=True, exist_ok=True)
+        # Sweeping removes what it does not know: a directory of anything else must never become a store.
+        foreign = {entry.name for entry in path.iterdir()} - {LOCK}
+        if foreign and not foreign & {CATALOG, PLACE}:
+            raise StoreInputError(
+                f"store: {path} is no store and already holds {min(foreign)}; give a new directory"
+            )
+        with locked(path / LOCK):
+            place = Place.choose(path)
+            with closing(Catalog(place)) as catalog:
+                catalog.create()
+            place.keep(path)
+            for directory in (RUNS, STAGING):
+                (path / directory).mkdir(exist_ok=True)
+            flush(path)
+
+
+@contextmanager
+def _refused(path: Path) -> Iterator[None]:
+    """Say of a store that cannot be opened that it cannot."""
+    try:
+        yield
+    except (OSError, *UNUSABLE) as error:
+        raise StoreInputError(f"store: {path} cannot be opened ({reason(error)})") from error

@@ -12,19 +12,9 @@ from api.database import Database
 from api.jobs import Jobs
 from api.settings import Settings
 from ensemble.store import Store
-from tests.api import postgresql
+from tests import postgresql
 from tests.api.servers import client_of
 from tests.api.stores import fill
-
-
-@pytest.fixture(scope="session")
-def postgresql_server() -> Iterator[postgresql.Server]:
-    """A PostgreSQL server."""
-    programs = postgresql.programs()
-    if programs is None:
-        pytest.skip("no PostgreSQL server: install the system's package")
-    with postgresql.running(programs) as server:
-        yield server
 
 
 @pytest.fixture

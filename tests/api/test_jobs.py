@@ -30,6 +30,7 @@ from api.job import (
     study_work,
 )
 from api.jobs import LEASE_SECONDS, Jobs
+from api.worker_name import own_name
 from ensemble.keys import run_key
 from ensemble.study import load_scene, load_study
 
@@ -208,6 +209,16 @@ def test_owners_take_turns_however_many_jobs_they_have(jobs):
 def test_the_oldest_job_of_an_owner_comes_first(jobs):
     submitted = [submit(jobs).id for _ in range(4)]
     assert [leased(jobs).job.id for _ in range(4)] == submitted
+
+
+def test_the_job_of_a_worker_that_is_seen_to_have_died_is_taken_at_once(jobs):
+    place, number, started = own_name().split(" ")
+    dead = f"{place} {number} {int(started) - 1}"
+    job, other = submit(jobs), submit(jobs)
+    assert leased(jobs, dead).job.id == job.id
+    assert leased(jobs, own_name()).job.id == job.id, "without waiting for the lease to run out"
+    assert jobs.get(job.id).attempts == 2
+    assert leased(jobs, own_name()).job.id == other.id, "the living keep theirs"
 
 
 def test_workers_that_ask_at_once_get_different_jobs(jobs):

@@ -1,25 +1,31 @@
 """Measures the service on the loopback: ``python -m tests.benchmarks.service_load``.
 
-A real server process answers from a store with many jobs and, with ``--busy``, beside a job under MPI; the
-program wrk asks.  Prints, as JSON, requests a second, the 99th percentile of their time and refusals.
+A real server process answers from a store with many jobs, to listeners to the events of a job as well and,
+with ``--busy``, beside a job under MPI; the program wrk asks.  Prints, as JSON, requests a second, the 99th
+percentile of their time, refusals and, since it depends least on what else the machine does, the server's
+processor time a request.
 """
 
 from __future__ import annotations
 
 import argparse
+import asyncio
 import json
 import os
 import re
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import httpx
+import psutil
 from sqlalchemy import insert
 
 from api.database import Database
@@ -61,8 +67,8 @@ def fill_queue(store: Path, count: int) -> list[str]:
 
 
 @contextmanager
-def server(store: Path, workers: int) -> Iterator[str]:
-    """Start a server process; gives its address."""
+def server(store: Path, workers: int) -> Iterator[tuple[psutil.Process, str]]:
+    """Start a server process; gives it and its address."""
     said = store.with_name("said")
     command = [sys.executable, "-m", "ensemble.cli", "serve", "--port=0", f"--workers={workers}"]
     with said.open("wb") as log:
@@ -74,25 +80,59 @@ def server(store: Path, workers: int) -> Iterator[str]:
             if process.poll() is not None:
                 sys.exit(said.read_text(encoding="utf-8"))
             time.sleep(0.1)
-        yield found[1]
+        yield psutil.Process(process.pid), found[1]
     finally:
         process.terminate()
         process.wait()
 
 
-def ask(directory: Path, address: str, seconds: int, script: str) -> dict[str, Any]:
+@contextmanager
+def listening(address: str, path: str, listeners: int) -> Iterator[None]:
+    """Listen over so many connections, from a thread."""
+    parts = urlsplit(address)
+    request = f"GET {path} HTTP/1.1\r\nHost: {parts.netloc}\r\n\r\n".encode()
+    ready = threading.Barrier(2)
+    loop = asyncio.new_event_loop()
+
+    async def listen() -> None:
+        connections = [await asyncio.open_connection(parts.hostname, parts.port) for _ in range(listeners)]
+        for reader, writer in connections:
+            writer.write(request)
+            await reader.readuntil(b"event: job")
+        ready.wait()
+        await asyncio.gather(*(reader.read() for reader, _ in connections))
+
+    thread = threading.Thread(target=lambda: loop.run_until_complete(listen()), daemon=True)
+    thread.start()
+    ready.wait(60)
+    yield
+    assert thread.is_alive(), "the listeners were sent away"
+
+
+def processor_seconds(process: psutil.Process) -> float:
+    """Processor time that a process has used."""
+    used = process.cpu_times()
+    return used.user + used.system
+
+
+def ask(directory: Path, process: psutil.Process, address: str, seconds: int, script: str) -> dict[str, Any]:
     """Send requests over many connections at once."""
     file = directory / "requests.lua"
     file.write_text(script, encoding="utf-8")
     command = ["wrk", "-t1", f"-c{CONNECTIONS}", f"-d{seconds}s", "--latency", f"--script={file}", address]
+    before = processor_seconds(process)
     text = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    used = processor_seconds(process) - before
+    count = re.search(r"(\d+) requests in", text)
     rate = re.search(r"Requests/sec:\s+([\d.]+)", text)
     slow = re.search(r"99%\s+([\d.]+)(us|ms|s)", text)
     refused = re.search(r"Non-2xx or 3xx responses: (\d+)", text)
+    assert count is not None, text
     assert rate is not None, text
     assert slow is not None, text
     return {
         "per_second": float(rate[1]),
+        "processor_milliseconds": 1e3 * used / int(count[1]),
         "p99_milliseconds": float(slow[1]) * TO_MILLISECONDS[slow[2]],
         "refused": int(refused[1]) if refused else 0,
     }
@@ -116,6 +156,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--jobs", type=int, default=100_000, help="in the store")
     parser.add_argument("--seconds", type=int, default=10, help="for each kind of request")
+    parser.add_argument("--listeners", type=int, default=100, help="to the events of a job")
     parser.add_argument("--busy", action="store_true", help="beside a job of one rank")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as temporary:
@@ -132,13 +173,13 @@ def main() -> None:
             "GET /boundaries/{key}": getting(f"/boundaries/{boundary}"),
             "POST /jobs": POST,
         }
-        with server(store, workers=int(options.busy)) as address:
-            if options.busy:
-                httpx.post(f"{address}/jobs", json=ENDLESS).raise_for_status()
-            measured = {
-                name: ask(directory, f"{address}/jobs", options.seconds, script)
-                for name, script in scripts.items()
-            }
+        with server(store, workers=int(options.busy)) as (process, address):
+            listened = httpx.post(f"{address}/jobs", json=ENDLESS).raise_for_status().json()["id"]
+            with listening(address, f"/jobs/{listened}/events", options.listeners):
+                measured = {
+                    name: ask(directory, process, f"{address}/jobs", options.seconds, script)
+                    for name, script in scripts.items()
+                }
     load = os.getloadavg()[0]
     print(json.dumps({"jobs": options.jobs, "busy": options.busy, "load": load} | measured, indent=2))
 

@@ -1,4 +1,4 @@
-"""The store: exact, filtered in SQL, and whole after any kill."""
+"""The store: exact, and whole after any kill."""
 
 from __future__ import annotations
 
@@ -13,22 +13,20 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import xarray
-from pydantic import ValidationError
 
-from ensemble.boundary import Boundary, BoundaryPoint
 from ensemble.keys import run_key
 from ensemble.store import Store, StoreError, StoreInputError
 from solver.run import Outcome, Run
 from solver.scene import Criteria, Numerics
 from solver.simulate import simulate
-from tests.ensemble.runs import assert_same_run, failed_run, quiescent_scene, shear_run, shear_scene
+from tests.ensemble.runs import assert_same_run, failed_run, shear_run, shear_scene
 
 PRELUDE = """
 import sys
@@ -398,144 +396,3 @@ def test_leftover_of_a_dead_writer_is_no_damage_and_is_swept(store: Store) -> No
     assert store.check() == []
     store.sweep()
     assert not leftover.parent.exists()
-
-
-# Filters
-
-# The third rate and the period have all 17 digits; they have to compare exactly.
-RATES = [0.25, 0.5, 0.1 + 0.2, 1.0]
-
-
-@pytest.fixture(scope="module")
-def filled(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Store]:
-    outcomes = [Outcome.BOUND, Outcome.SEPARATED, Outcome.END_TO_END, Outcome.BOUND]
-    with Store.open(tmp_path_factory.mktemp("filters") / "store") as store:
-        for rate, outcome in zip(RATES, outcomes, strict=True):
-            run = shear_run(shear_scene(rate, hamaker=4 * rate), outcome)
-            store.save(replace(run, period=10 / rate))
-        # A period that is not a number is no number to compare with.
-        store.save(replace(failed_run(), period=float("nan")))
-        yield store
-
-
-@pytest.mark.parametrize(
-    ("where", "rates"),
-    [
-        ([], {*RATES, None}),
-        (["flow.rate>=0.5"], {0.5, 1.0}),
-        (["flow.rate > 0.5"], {1.0}),
-        (["flow.rate<0.5"], {0.25, RATES[2]}),
-        (["flow.rate<=0.25"], {0.25}),
-        (["flow.rate=0.30000000000000004"], {RATES[2]}),
-        (["flow.rate=0.3"], set()),
-        (["flow.rate!=1"], {0.25, 0.5, RATES[2]}),
-        (["adhesion.hamaker<2", "flow.rate>0.25"], {RATES[2]}),
-        (["outcome=bound"], {0.25, 1.0}),
-        (["outcome=end-to-end"], {RATES[2]}),
-        (["outcome!=bound"], {0.5, RATES[2], None}),
-        (["period>=10"], set(RATES)),
-        (["period=33.33333333333333"], {RATES[2]}),
-        (["flow=null"], {None}),
-        (["flow!=null"], set(RATES)),
-        (["failure!=null"], {None}),
-        (["flow.kind=shear"], set(RATES)),
-        (["flow.kind=trap"], set()),
-        (["start.relaxed=false", "numerics.points=32"], set(RATES)),
-        (["start.relaxed=true"], set()),
-        (["vesicles.0.center.0<-1"], set(RATES)),
-        (["vesicles.0.reduced_area=1"], {None}),
-        (["viscosity.total>-1"], set(RATES)),
-        (["work.steps>=400", "flow=null"], {None}),
-        (["created>2000-01-01"], {*RATES, None}),
-        (["created<2000-01-01T00:00:00Z"], set()),
-        ([f"key={run_key(quiescent_scene())}"], {None}),
-    ],
-)
-def test_filter(filled: Store, where: list[str], rates: set[float | None]) -> None:
-    found = filled.summaries(where)
-    assert {None if summary.scene.flow is None else summary.scene.flow.rate for summary in found} == rates
-    assert len(found) == len(rates)
-
-
-@pytest.mark.parametrize(
-    ("where", "message"),
-    [
-        ("flow.rate", "'flow.rate' is not of the form"),
-        ("flow.rate==1", "'flow.rate==1' is not of the form"),
-        ("flow.rate=", "'flow.rate=' is not of the form"),
-        ("=1", "'=1' is not of the form"),
-        ("flow.rat=1", "'flow.rat'"),
-        ("rate=1", "unknown field 'rate'"),
-        ("scene.flow.rate=1", "unknown field 'scene.flow.rate'"),
-        ("horizon.seconds=1", "'horizon.seconds'"),
-        ("vesicles.reduced_area=1", "vesicles.0"),
-        ("vesicles.0.center.2=1", "'vesicles.0.center.2'"),
-        ("flow.rate=fast", "'fast' is no value of flow.rate"),
-        ("numerics.points>1.5", "'1.5' is no value of numerics.points"),
-        ("outcome=bond", "'bond' is no value of outcome.*'bound'"),
-        ("flow.kind=sheer", "'sheer' is no value of flow.kind.*'extension', 'shear' or 'trap'"),
-        ("start.relaxed=maybe", "'maybe' is no value of start.relaxed"),
-        ("created>today", "'today' is no value of created"),
-        ("outcome<bound", "outcome is not a number"),
-        ("flow=shear", "flow is a group of fields"),
-        ("period<null", "'null' is no value of period"),
-    ],
-)
-def test_wrong_filter_is_named(filled: Store, where: str, message: str) -> None:
-    with pytest.raises(ValueError, match=f"^where: .*{message}"):
-        filled.summaries([where])
-
-
-# Boundaries
-
-NOON = datetime(2026, 1, 1, 12, tzinfo=UTC)
-
-
-def boundary(study_key: str, low: float, high: float | None, updated: datetime) -> Boundary:
-    point = BoundaryPoint(
-        parameters={"flow.rate": 0.5},
-        bracket=(low, high),
-        outcomes=("separated", None if high is None else "bound"),
-        status="converged",
-        certified=False,
-        runs=["a", "b"],
-    )
-    study = {"name": "critical", "scene": {"adhesion": {"distance": low}}}
-    return Boundary(study_key=study_key, study=study, name="critical", points=[point], updated=updated)
-
-
-def test_critical_value_is_the_geometric_mean_of_a_closed_bracket() -> None:
-    assert boundary("a", 0.25, 1.0, NOON).points[0].critical_value == 0.5
-    assert boundary("a", 0.25, None, NOON).points[0].critical_value is None
-    with pytest.raises(ValidationError, match="bracket"):
-        boundary("a", -1.0, 1.0, NOON)
-
-
-def test_boundary_is_replaced_at_once_and_seen_by_others(store: Store) -> None:
-    with Store.existing(store.path) as observer:
-        assert observer.boundaries() == []
-        store.save_boundary(boundary("a", 0.1, None, NOON))
-        assert observer.boundaries() == [boundary("a", 0.1, None, NOON)]
-        store.save_boundary(boundary("b", 0.2, None, NOON + timedelta(seconds=1)))
-        store.save_boundary(boundary("a", 0.1, 0.3, NOON + timedelta(seconds=2)))
-        assert [found.study_key for found in observer.boundaries()] == ["b", "a"]
-        assert observer.boundaries()[1] == boundary("a", 0.1, 0.3, NOON + timedelta(seconds=2))
-    assert store.check() == []
-
-
-def test_boundary_filters(store: Store) -> None:
-    store.save_boundary(boundary("a", 0.1, None, NOON))
-    store.save_boundary(boundary("b", 0.2, 0.4, NOON + timedelta(hours=1)))
-
-    def found(*where: str) -> list[str]:
-        return [boundary.study_key for boundary in store.boundaries(where)]
-
-    assert found("name=critical") == ["a", "b"]
-    assert found("name=other") == []
-    assert found("study.scene.adhesion.distance>0.15") == ["b"]
-    assert found("study.name=critical", "study_key=a") == ["a"]
-    assert found("points.0.critical_value=null") == ["a"]
-    assert found("points.0.parameters.flow=1") == []
-    assert found("updated>2026-01-01T12:30:00") == ["b"]
-    with pytest.raises(StoreInputError, match="unknown field 'title'"):
-        found("title=x")
