@@ -161,8 +161,9 @@ _ANGLE_CAPTION = (
 )
 _ANGLE_TEXT = (
     "The paper gives final angles in a figure only.  Deflated pairs turn to 90° at low rates, as "
-    "published.  Rounder ones stay at 180°: their line of centers is the longest axis of the pair, which "
-    "the flow aligns with its diverging axis; for them 180° is the stable configuration."
+    "published.  The roundest ones (reduced area 0.9 and more, low rates) return to 180°: their line of "
+    "centers is the longest axis of the pair, which the flow aligns with its diverging axis.  At reduced "
+    "area 0.85 and rate 0.01 the pair turns too slowly to be told from one at rest."
 )
 _DIAGRAM_TEXT = (
     "The published critical rate is where the side-by-side doublet is lost.  Past the paper: beyond it "
