@@ -26,7 +26,7 @@ _PRESETS: Final = {0.4: "critical-hamaker", 0.1: "critical-hamaker-short-range"}
 _QUICK_RATES = (0.5, 1.0)
 _QUICK_TOLERANCE = 0.05
 _ALLOWED = 3.0  # percent, of published brackets
-_COME_ROUND = 1.5 * math.pi  # of the line of centers: it has then passed its second approach
+_COME_ROUND = 1.5 * math.pi  # of the line of centers
 
 
 class _Published(NamedTuple):
@@ -64,7 +64,7 @@ def _study(distance: float, quick: bool) -> StudyCase:
 
 
 def seen_at_the_end(run: Run) -> str:
-    """What one who looks at a run's end sees: separated if the pair moves apart and has not yet come round."""
+    """What a run's end looks like: separated if the pair moves apart and has not come round yet."""
     distance, angle = run.series["center_distance"], run.series["center_angle"]
     leaving = distance[-1] > distance[-2] and abs(angle[-1] - angle[0]) < _COME_ROUND
     return _FATES[0] if run.outcome is Outcome.SEPARATED or leaving else _FATES[1]
