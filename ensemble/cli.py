@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from enum import StrEnum
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -17,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ensemble.errors import BadInput
+from ensemble.errors import BadInput, refusing
 from ensemble.mpi import launched_rank, only_first_rank_speaks, pin_threads
 from ensemble.report import ReportName
 
@@ -46,6 +45,14 @@ StorePath = Annotated[Path, typer.Option("--store", metavar="DIR", help="Directo
 Filters = Annotated[
     list[str],
     typer.Option(metavar="CONDITION", help="For example flow.rate>=0.5 or outcome=bound.  Repeatable."),
+]
+RanksPerRun = Annotated[
+    str | None,
+    typer.Option(
+        "--ranks-per-run",
+        metavar="G|auto",
+        help="How many ranks compute a run together; auto: as many as pay off for the scene.",
+    ),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
 
@@ -101,12 +108,14 @@ def bisect(
     certify: Annotated[
         bool, typer.Option("--certify", help="Run both ends of every bracket again at finer numerics.")
     ] = False,
+    ranks_per_run: RanksPerRun = None,
     progress: ProgressAs = ProgressFormat.TEXT,
     as_json: AsJson = False,
 ) -> None:
     """Trace a boundary, on all ranks, running only what the store does not have.
 
-    The exit status is 0 only if every search converged and every bracket that was to be certified is.
+    Each rank makes runs of its own unless ranks are asked to share them.  The exit status is 0 only if every
+    search converged and every bracket that was to be certified is.
     """
     from ensemble.documents import study_document
     from ensemble.mpi import abort_guard, on_root, world
@@ -115,8 +124,11 @@ def bisect(
 
     communicator = world()
     with abort_guard(communicator):
-        prepared = on_root(communicator, lambda: _prepare(study, changes, tolerance, certify, store))
-        traced = _trace(communicator, prepared, store, progress)
+        size = communicator.Get_size()
+        prepared, ranks = on_root(
+            communicator, lambda: _prepare(study, changes, tolerance, certify, store, ranks_per_run, size)
+        )
+        traced = _trace(communicator, prepared, store, progress, ranks)
     if as_json:
         _print_json(study_document(traced, store))
     else:
@@ -126,18 +138,30 @@ def bisect(
     raise typer.Exit(0 if converged else 1)
 
 
-def _prepare(study: str, changes: list[str], tolerance: float | None, certify: bool, store: Path) -> Study:
+def _prepare(
+    study: str,
+    changes: list[str],
+    tolerance: float | None,
+    certify: bool,
+    store: Path,
+    ranks_per_run: str | None,
+    size: int,
+) -> tuple[Study, int]:
     """Load the study, then create or sweep the store: a study that is refused leaves no trace."""
+    from ensemble.groups import chosen_ranks
     from ensemble.store import Store
     from ensemble.study import load_study
 
-    with _refusing():
+    with refusing():
         loaded = load_study(study, changes, tolerance, certify)
+        ranks = chosen_ranks(ranks_per_run or "1", loaded.scene, size)
         Store.open(store).close()
-    return loaded
+    return loaded, ranks
 
 
-def _trace(communicator: Intracomm, study: Study, path: Path, progress: ProgressFormat) -> Traced:
+def _trace(
+    communicator: Intracomm, study: Study, path: Path, progress: ProgressFormat, ranks_per_run: int
+) -> Traced:
     from rich.console import Console
 
     from ensemble.progress import study_lines, study_progress
@@ -146,7 +170,7 @@ def _trace(communicator: Intracomm, study: Study, path: Path, progress: Progress
 
     shown = study_lines if progress is ProgressFormat.JSON else study_progress
     with Store.existing(path) as store, shown(Console(stderr=True)) as show:
-        return trace(communicator, study, store, show)
+        return trace(communicator, study, store, show, ranks_per_run)
 
 
 def _cost(cost: Cost) -> str:
@@ -162,35 +186,26 @@ def run(
     scene: Annotated[str, typer.Argument(help="Name of a preset, or a TOML file.")],
     changes: Changes = [],  # noqa: B006
     store: Annotated[Path | None, typer.Option(metavar="DIR", help="Keep the run in this store.")] = None,
+    ranks_per_run: RanksPerRun = None,
     progress: ProgressAs = ProgressFormat.TEXT,
     as_json: AsJson = False,
 ) -> None:
-    """Simulate one scene, unless the store has the run.  The exit status is 1 if it failed numerically."""
-    if launched_rank() != 0:
-        return
+    """Simulate one scene on all ranks together, unless the store has the run.
+
+    The exit status is 1 if it failed numerically.
+    """
     from rich.console import Console
 
     from ensemble.documents import run_document
-    from ensemble.keys import run_key
     from ensemble.progress import run_lines, run_progress
-    from ensemble.record import RunSummary
-    from ensemble.study import load_scene
+    from ensemble.single import single_run
     from ensemble.tables import run_table
     from solver.run import Outcome
-    from solver.simulate import simulate
 
-    with ExitStack() as stack:
-        with _refusing():
-            loaded = load_scene(scene, changes)
-            keep = None if store is None else stack.enter_context(_opened(store))
-        if keep is not None and keep.contains(run_key(loaded)):
-            summary = keep.summary(run_key(loaded))
-        else:
-            shown = run_lines if progress is ProgressFormat.JSON else run_progress
-            finished = simulate(loaded, on_progress=stack.enter_context(shown(Console(stderr=True))))
-            if keep is not None:
-                keep.save(finished)
-            summary = RunSummary.of(finished)
+    shown = run_lines if progress is ProgressFormat.JSON else run_progress
+    summary = single_run(scene, changes, store, ranks_per_run, shown(Console(stderr=True)))
+    if summary is None:
+        return
     document = run_document(summary)
     if as_json:
         _print_json(document)
@@ -209,7 +224,7 @@ def query(
     """List the runs or the boundaries of a store."""
     from ensemble.tables import boundaries_table, runs_table
 
-    with _refusing(), _existing(store) as opened:
+    with refusing(), _existing(store) as opened:
         if kind is Kind.RUNS:
             runs = opened.summaries(where)
             documents, table = [summary.document() for summary in runs], runs_table(runs)
@@ -238,7 +253,7 @@ def show(
     from ensemble.documents import run_document
     from ensemble.tables import boundary_table, run_table
 
-    with _refusing(), _existing(store) as opened:
+    with refusing(), _existing(store) as opened:
         boundary = _boundary(opened, name)
         if output is not None:
             _draw(opened, boundary or name, output)
@@ -322,7 +337,7 @@ def _paper(only: list[str], quick: bool, store: Path) -> Report | None:
     from ensemble.report.progress import report_progress
     from ensemble.store import Store
 
-    with _refusing():
+    with refusing():
         sections = chosen(only)
     communicator = world()
     with abort_guard(communicator):
@@ -332,7 +347,7 @@ def _paper(only: list[str], quick: bool, store: Path) -> Report | None:
 
 
 def _create(store: Path) -> None:
-    with _refusing():
+    with refusing():
         _opened(store).close()
 
 
@@ -346,7 +361,7 @@ def _measurements(name: ReportName, quick: bool, store: Path) -> Report | None:
     from ensemble.report.progress import report_progress
 
     with ExitStack() as stack:
-        with _refusing():
+        with refusing():
             opened = stack.enter_context(_opened(store))
         return make_report(name, opened, quick, stack.enter_context(report_progress(Console(stderr=True))))
 
@@ -354,7 +369,7 @@ def _measurements(name: ReportName, quick: bool, store: Path) -> Report | None:
 @app.command()
 def check(store: StorePath = DEFAULT_STORE, as_json: AsJson = False) -> None:
     """Verify every run and boundary of a store; the exit status is 1 if anything is wrong."""
-    with _refusing(), _existing(store) as opened:
+    with refusing(), _existing(store) as opened:
         problems = opened.check()
     if as_json:
         _print_json({"store": str(store), "problems": problems})
@@ -372,7 +387,7 @@ def export(
     """Write a run to a single HDF5 file."""
     import ensemble.checkpoint
 
-    with _refusing(), _existing(store) as opened:
+    with refusing(), _existing(store) as opened:
         ensemble.checkpoint.export(opened.summary(key), opened.load(key), file)
 
 
@@ -386,15 +401,6 @@ def _opened(path: Path) -> Store:
     from ensemble.store import Store
 
     return Store.open(path)
-
-
-@contextmanager
-def _refusing() -> Iterator[None]:
-    """Turn what the packages say about unusable input into `BadInput`."""
-    try:
-        yield
-    except (ValueError, OSError) as error:
-        raise BadInput(str(error)) from error
 
 
 def _print_json(document: Any) -> None:

@@ -1,8 +1,9 @@
-"""Makes the runs of an agenda on all ranks of a communicator.
+"""Makes the runs of an agenda on all groups of ranks.
 
-Every rank simulates.  Rank 0 also runs the dispatcher, in a thread beside its own simulations: it alone
-decides what is run next and alone writes to the database, so ranks never contend for either.  All ranks,
-rank 0 and a rank that is alone included, talk to it by the same messages.
+Every rank simulates, together with the others of its group.  Rank 0 also runs the dispatcher, in a thread
+beside its own simulations: it alone decides what is run next and alone writes to the database, so ranks
+never contend for either.  All leaders of groups, rank 0 and one that is alone included, talk to it by the
+same messages, and pass orders on to their group.
 
 A blocking receive would spin and take the core from the simulation, so both sides poll with short sleeps.
 """
@@ -11,10 +12,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, cast
 
 from ensemble.agenda import Agenda, SomeTask, Task
+from ensemble.groups import Groups
 from ensemble.mpi import abort_guard
 from ensemble.usage import Cost, Usage
 
@@ -44,7 +47,7 @@ class Stop:
 
 @dataclass(frozen=True)
 class Ready:
-    """Report: this rank waits for its first task."""
+    """Report: this group waits for its first task."""
 
 
 @dataclass(frozen=True)
@@ -71,21 +74,42 @@ Report = Ready | Finished | Stopped
 class Standing(Generic[SomeTask]):
     """How far an agenda has come."""
 
-    running: Mapping[int, SomeTask]  # by rank
+    running: Mapping[int, SomeTask]  # by the rank of the group's leader among all leaders
     runs: int  # finished so far, without those that the store already had
     known: int  # answers that the store already had
     elapsed: float  # seconds
     seconds_left: float | None  # estimate, None before the first run is finished
 
 
-def work(communicator: Intracomm, store: Store) -> None:
-    """Simulate what the dispatcher orders until it says stop."""
-    with abort_guard(communicator):
-        _send(communicator, Ready(), 0, _REPORTS)
-        while not isinstance(order := _wait(communicator), Stop):
-            # A cancellation that crossed the report of the run it names has nothing left to stop.
-            if isinstance(order, Task):
-                _send(communicator, _simulate(communicator, store, order), 0, _REPORTS)
+def work(groups: Groups, store: Store) -> None:
+    """Simulate what the dispatcher orders until it says stop; all ranks do."""
+    with abort_guard(groups.everyone):
+        if groups.leaders is None:
+            _follow(groups)
+        else:
+            _lead(groups, groups.leaders, store)
+
+
+def _lead(groups: Groups, leaders: Intracomm, store: Store) -> None:
+    _send(leaders, Ready(), 0, _REPORTS)
+    while True:
+        order = _wait(leaders)
+        # A cancellation that crossed the report of the run it names has nothing left to stop.
+        if isinstance(order, Cancel):
+            continue
+        for follower in groups.followers:
+            _send(groups.group, order, follower, _ORDERS)
+        if isinstance(order, Stop):
+            return
+        _send(leaders, _simulate(groups, leaders, store, order), 0, _REPORTS)
+
+
+def _follow(groups: Groups) -> None:
+    from solver.simulate import Cancelled, simulate
+
+    while isinstance(order := _wait(groups.group), Task):
+        with suppress(Cancelled):
+            simulate(order.scene, parallel=groups.parallel)
 
 
 def _wait(communicator: Intracomm) -> Order:
@@ -94,13 +118,13 @@ def _wait(communicator: Intracomm) -> Order:
     return cast(Order, received[0])
 
 
-def _simulate(communicator: Intracomm, store: Store, task: Task) -> Report:
+def _simulate(groups: Groups, leaders: Intracomm, store: Store, task: Task) -> Report:
     # A study whose answers are all in the store never needs the compiled kernels.
     from solver.simulate import Cancelled, simulate
 
     begin = time.perf_counter()
     try:
-        run = simulate(task.scene, should_stop=_Cancellation(communicator, task.key))
+        run = simulate(task.scene, parallel=groups.parallel, should_stop=_Cancellation(leaders, task.key))
     except Cancelled:
         return Stopped(time.perf_counter() - begin)
     seconds = time.perf_counter() - begin
@@ -132,13 +156,13 @@ class Dispatcher(Generic[SomeTask]):
     Parameters
     ----------
     communicator : Intracomm
-        All of its ranks `work` meanwhile.
+        The leaders of all groups, all ranks of which `work` meanwhile.
     agenda : Agenda
     store : Store
     on_change : callable
         Called whenever an outcome or an assignment changed something.
     usage : Usage
-        Takes down what the ranks do.
+        Takes down what the groups do.
     """
 
     def __init__(

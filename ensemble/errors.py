@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 
 class EnsembleError(Exception):
     """Base of every error that this package raises on purpose."""
@@ -12,3 +15,12 @@ class BadInput(EnsembleError):  # noqa: N818
 
     Raised before any work starts and before anything is written.
     """
+
+
+@contextmanager
+def refusing() -> Iterator[None]:
+    """Turn what the packages say about unusable input into `BadInput`."""
+    try:
+        yield
+    except (ValueError, OSError) as error:
+        raise BadInput(str(error)) from error

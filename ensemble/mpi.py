@@ -84,11 +84,13 @@ def world() -> Intracomm:
     return MPI.COMM_WORLD
 
 
-def on_root(communicator: Intracomm, function: Callable[[], T]) -> T:
+def on_root(communicator: Intracomm | None, function: Callable[[], T]) -> T:
     """Call ``function`` on rank 0 and return its result, or raise its `BadInput`, on every rank.
 
-    Collective.  The result is pickled.
+    Collective.  The result is pickled.  Without a communicator this process is the only rank.
     """
+    if communicator is None:
+        return function()
     result: T | BadInput | None = None
     if communicator.Get_rank() == 0:
         try:

@@ -1,4 +1,4 @@
-"""Traces a study, or runs a batch of scenes, on all ranks of a communicator."""
+"""Traces a study, or runs a batch of scenes, on all ranks of a communicator, in groups."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from ensemble.agenda import Agenda, Task
 from ensemble.batch import Batch
 from ensemble.coordinator import Coordinator
 from ensemble.dispatcher import Dispatcher, Standing, work
+from ensemble.groups import Groups
 from ensemble.inquiry import Trial
 from ensemble.mpi import abort_guard
 from ensemble.usage import Cost, Usage
@@ -44,7 +45,11 @@ class Traced:
 
 
 def trace(
-    communicator: Intracomm, study: Study, store: Store, on_change: Callable[[Snapshot], None]
+    communicator: Intracomm,
+    study: Study,
+    store: Store,
+    on_change: Callable[[Snapshot], None],
+    ranks_per_run: int = 1,
 ) -> Traced:
     """Trace the boundary of a study, running what the store does not have.
 
@@ -59,6 +64,8 @@ def trace(
         The same on every rank; rank 0 commits.
     on_change : callable
         Called on rank 0, in the coordinator's thread, whenever an answer or an assignment changed something.
+    ranks_per_run : int
+        How many ranks compute a run together.
 
     Returns
     -------
@@ -74,7 +81,7 @@ def trace(
         store.save_boundary(boundary)
         on_change(Snapshot(boundary, standing))
 
-    boundary, cost = _carry_out(communicator, store, begin, publish, Coordinator.boundary)
+    boundary, cost = carry_out(communicator, ranks_per_run, store, begin, publish, Coordinator.boundary)
     return Traced(boundary, cost)
 
 
@@ -83,6 +90,7 @@ def run_batch(
     scenes: Iterable[Scene],
     store: Store,
     on_change: Callable[[Standing[Task]], None],
+    ranks_per_run: int = 1,
 ) -> Cost:
     """Run independent scenes, as far as the store does not have their runs.
 
@@ -93,8 +101,9 @@ def run_batch(
     Cost
         On every rank.
     """
-    _, cost = _carry_out(
+    _, cost = carry_out(
         communicator,
+        ranks_per_run,
         store,
         begin=lambda: Batch(scenes, store.outcome),
         publish=lambda batch, standing: on_change(standing),
@@ -106,32 +115,48 @@ def run_batch(
 SomeAgenda = TypeVar("SomeAgenda", bound=Agenda)
 
 
-def _carry_out(
+def carry_out(
     communicator: Intracomm,
+    ranks_per_run: int,
     store: Store,
     begin: Callable[[], SomeAgenda],
     publish: Callable[[SomeAgenda, Standing], None],
     conclude: Callable[[SomeAgenda], Result],
 ) -> tuple[Result, Cost]:
-    """Make the runs of the agenda that rank 0 begins; every rank gets what rank 0 concludes from it."""
-    private = communicator.Dup()
+    """Make the runs of an agenda; every rank gets what rank 0 concludes from it, and what it cost.
 
-    def coordinate() -> tuple[Result, Cost]:
-        with abort_guard(private):
-            usage = Usage(private.Get_size(), time.perf_counter)
+    Collective.
+
+    Parameters
+    ----------
+    communicator, ranks_per_run, store
+        As for `trace`.
+    begin : callable
+        Returns the agenda, on rank 0.
+    publish : callable
+        Called as ``on_change`` of `trace` is, with the agenda.
+    conclude : callable
+        Returns what is wanted of the agenda once it is done; it is pickled.
+    """
+    groups = Groups.of(communicator, ranks_per_run)
+    everyone, leaders = groups.everyone, groups.leaders
+
+    def coordinate(leaders: Intracomm) -> tuple[Result, Cost]:
+        with abort_guard(everyone):
+            usage = Usage(leaders.Get_size(), time.perf_counter)
             agenda = begin()
-            dispatcher = Dispatcher(private, agenda, store, lambda standing: publish(agenda, standing), usage)
+            dispatcher = Dispatcher(leaders, agenda, store, lambda standing: publish(agenda, standing), usage)
             cost = dispatcher.run()
             return conclude(agenda), cost
 
     result: tuple[Result, Cost] | None = None
-    if private.Get_rank() == 0:
+    if leaders is not None and leaders.Get_rank() == 0:
         with ThreadPoolExecutor(1, "coordinator") as beside:
-            coordination = beside.submit(coordinate)
-            work(private, store)
+            coordination = beside.submit(coordinate, leaders)
+            work(groups, store)
             result = coordination.result()
     else:
-        work(private, store)
-    result = private.bcast(result)
-    private.Free()
+        work(groups, store)
+    result = everyone.bcast(result)
+    groups.free()
     return cast(tuple[Result, Cost], result)

@@ -1,4 +1,4 @@
-"""How much of its time each rank of a job spends in simulations."""
+"""How much of its time each group of ranks of a job spends in simulations."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from dataclasses import dataclass
 class Cost:
     """What it took to make the runs of a job.
 
-    `busy_fractions` holds one number a rank: the share of the time that it spent in simulations, from the
-    start to the moment from which on some rank found nothing useful left to run.  It is empty when
+    `busy_fractions` holds one number a group: the share of the time that it spent in simulations, from the
+    start to the moment from which on some group found nothing useful left to run.  It is empty when
     the store had every answer.
     """
 

@@ -210,3 +210,9 @@ def test_binding_energies_are_those_of_parallel_lines(exponents_of: tuple[int, i
     assert -energy(np.linspace(0.8, 1.0, 20001)).min() == pytest.approx(
         exponents._BINDING[exponents_of], rel=1e-4
     )
+
+
+def test_lines_through_brackets_are_bounded_by_their_corners() -> None:
+    intercepts, slopes = critical_hamaker.lines_through({0.5: (1.0, 2.0), 1.0: (3.0, 3.5), 1.5: (4.0, 6.0)})
+    assert slopes == pytest.approx((2.0, 5.0))  # (0.5, 2) to (1, 3); (0.5, 1) to (1, 3.5)
+    assert intercepts == pytest.approx((-1.5, 1.0))

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Final, NamedTuple
+
+import numpy as np
+from scipy.optimize import linprog
 
 from ensemble.parameters import parameter_value
 from ensemble.report.paper import boundary_figures
 from ensemble.report.paper.boundary_figures import Diagram
 from ensemble.report.paper.case import StudyCase
-from ensemble.report.paper.comparison import Row, bracket, number, words
+from ensemble.report.paper.comparison import Bracket, Row, bracket, number, words
 from ensemble.report.paper.fit import Line, straight_line
 from ensemble.report.paper.published import published
 from ensemble.report.paper.results import Results
@@ -141,19 +144,33 @@ def _bracket_rows(results: Results, table: _Published, study: StudyCase) -> list
 def _line_rows(table: _Published, line: Line | None, study: StudyCase) -> list[Row]:
     if line is None:
         return []
+    intercepts, slopes = lines_through(table.brackets)
     return [
         number(
-            "slope of the line H_c(rate)", table.slope, line.slope, study, note=f"± {line.slope_error:.2g}"
-        ),
-        number(
-            "intercept of the line",
-            table.intercept,
-            line.intercept,
+            f"{name} of the line H_c(rate)",
+            known,
+            value,
             study,
             unit="",
-            note=f"± {line.intercept_error:.2g}",
-        ),
+            note=f"± {error:.2g}; lines through all published brackets have {low:.2f} to {high:.2f}",
+        )
+        for name, known, value, error, (low, high) in (
+            ("slope", table.slope, line.slope, line.slope_error, slopes),
+            ("intercept", table.intercept, line.intercept, line.intercept_error, intercepts),
+        )
     ]
+
+
+def lines_through(brackets: Mapping[float, Bracket]) -> tuple[Bracket, Bracket]:
+    """Least and greatest intercept, then slope, of the straight lines that pass all brackets."""
+    ends = np.array(list(brackets.values()))
+    line = np.stack([np.ones(len(ends)), list(brackets)], axis=1)
+    limits = {"A_ub": np.concatenate([line, -line]), "b_ub": np.concatenate([ends[:, 1], -ends[:, 0]])}
+
+    def least(direction: tuple[float, float]) -> float:
+        return float(linprog(direction, **limits, bounds=(None, None)).fun)
+
+    return (least((1, 0)), -least((-1, 0))), (least((0, 1)), -least((0, -1)))
 
 
 def _seen_rows(results: Results, ends: Iterable[tuple[Doublet, str]]) -> list[Row]:

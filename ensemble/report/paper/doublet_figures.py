@@ -101,7 +101,7 @@ def against_area(of_area: Mapping[float, Sequence[Energies]], best: Mapping[floa
         )
         if best[strength] is not None:
             right.axvline(best[strength], color=color, linestyle=":", linewidth=0.9)
-    right.set(xlabel=r"reduced area $\Delta A$", ylabel="total energy above its minimum", ylim=(0, 6))
+    right.set(xlabel=r"reduced area $\Delta A$", ylabel="total energy above its minimum", ylim=(0, 3))
     right.legend()
     return figure
 

@@ -19,10 +19,10 @@ from ensemble.report.paper.section import Chapter, Course, Drawing, Plan, Sectio
 
 _HAMAKER, _DISTANCE = 5.0, 0.2  # those of the published doublets
 _SHOWN = (0.6, 0.75, 0.95)  # reduced areas of the published shapes
-_REDUCED_AREAS = (0.6, 0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95, 0.98)
+_REDUCED_AREAS = (0.6, 0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95, 0.98, 0.99)
 _DISTANCES = (0.2, 0.3, 0.4)
 _HAMAKERS = (1.0, 2.0, 3.0, 4.0, 5.0)
-_STRENGTHS = (1.0, 2.5, 5.0, 10.0)  # for which the reduced area of least energy is looked for
+_STRENGTHS = (3.0, 4.0, 5.0, 6.5)  # for which the reduced area of least energy is looked for
 _AREA_OF_HAMAKERS = 0.95
 
 
@@ -129,7 +129,7 @@ _AREA_TEXT = (
 )
 _AREA_CAPTION = (
     "Left: bending (solid) and adhesion (dash-dotted) energy against reduced area, H = 5; diamonds: "
-    "published.  Right: their sum, less its smallest value, for several H; circles mark the minimum."
+    "published.  Right: their sum, less its smallest value, for several H; dotted lines mark the minimum."
 )
 _HAMAKER_TEXT = (
     "At reduced area 0.95 the paper finds that the shape, hence the bending energy, hardly changes with "

@@ -29,6 +29,7 @@ from solver.run import Outcome, Run
 from solver.scene import Trap
 
 _COLORS = (BLUE, GREEN, ORANGE, VERMILLION, PURPLE, SKY, BLACK)
+_TOP = 0.19  # of the phase diagram; at higher rates there are only separated pairs
 _BOX = 0.012  # half the width of a published bracket, in reduced area
 Place = tuple[float, float]  # reduced area and rate
 
@@ -42,8 +43,14 @@ def angles(turning: Sequence[Run], grid: Mapping[Place, RunSummary]) -> Figure:
         assert isinstance(run.scene.flow, Trap)
         angle = 90 + np.degrees(np.arcsin(np.abs(np.sin(run.series["center_angle"]))))
         left.plot(run.series["time"], angle, color=color, label=rf"$\dot\epsilon$ = {run.scene.flow.rate:g}")
-    left.set(xlabel="time $t$", ylabel=r"inclination angle $\theta$ (deg)", xlim=(0, None), ylim=(85, 185))
-    left.legend()
+    left.set(
+        xlabel="time $t$",
+        ylabel=r"inclination angle $\theta$ (deg)",
+        xscale="log",
+        xlim=(5, None),
+        ylim=(85, 185),
+    )
+    left.legend(loc="lower left")
     for color, area in zip(_COLORS, sorted({area for area, _ in grid}), strict=False):
         held = sorted(
             (rate, summary.inclination_angle)
@@ -66,7 +73,7 @@ def _size(summary: RunSummary) -> float:
     """Area of a mark in square points; that of a pair held side by side grows with its angle."""
     if summary.outcome is not Outcome.BOUND or summary.inclination_angle is None:
         return 30.0
-    return 8 + 0.6 * (summary.inclination_angle - 90)
+    return 6 + 1.1 * (summary.inclination_angle - 90)
 
 
 @matplotlib.rc_context(STYLE)
@@ -123,6 +130,6 @@ def phase_diagram(
                 label="published bracket" if index == 0 else None,
             )
         )
-    axes.set_ylim(0, None)
+    axes.set_ylim(0, _TOP)
     figure.legend(loc="outside right center")
     return figure

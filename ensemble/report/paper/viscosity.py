@@ -88,7 +88,11 @@ def _part(results: Results, case: Case, part: str) -> float | None:
 
 
 def _row(results: Results, name: str, value: float, case: Case, part: str) -> Row:
-    return number(f"[μ], {name}", value, _part(results, case, part), [case], allowed=_ALLOWED)
+    computed, total = _part(results, case, part), _part(results, case, "total")
+    note = ""
+    if part == "adhesion" and computed is not None and total is not None:  # a small part, read off a figure
+        note = f"differs by {computed - value:+.3f}, {100 * (computed - value) / total:+.1f} % of the total"
+    return number(f"[μ], {name}", value, computed, [case], allowed=_ALLOWED, note=note)
 
 
 def _independent_rows(results: Results, area: float, viscosity: float, inclination: float) -> list[Row]:

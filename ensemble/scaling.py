@@ -1,0 +1,85 @@
+"""How the time of one evaluation of a scene depends on the ranks that share it, and how many it is worth.
+
+An evaluation sums over all pairs of points, in rows that ranks share; every rank repeats what grows like the
+number of points (shapes, spectra, the vesicles' own parts); and for each sum the ranks gather the rows of
+all.  With P points on G ranks
+
+    t(G) = pair·P²/G + point·P + fixed + gathers·(latency·⌈log₂ G⌉ + bytes·P·(G − 1)/(G·bandwidth)),
+
+the latency of a collective growing like the depth of its tree (Thakur, Rabenseifner and Gropp, Int. J. High
+Perform. Comput. Appl. 19, 49 (2005)).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from solver.scene import Scene
+from solver.symmetry import independent_vesicles
+
+_AUTOMATIC_POINTS = 64  # that a scene usually comes to which leaves the number to the solver
+
+# The ranks of a run are worth their while as long as they are this efficient.
+LEAST_EFFICIENCY: Final = 0.7
+
+
+class ScalingModel(BaseModel):
+    """The constants of the time of one evaluation; seconds, bytes."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    pair: float = Field(ge=0)  # for each pair of points
+    point: float = Field(ge=0)  # for each point, on every rank
+    fixed: float = Field(ge=0)  # on every rank
+    gathers: float = Field(ge=0)  # collectives in an evaluation
+    bytes_a_point: float = Field(ge=0)  # that each of them gathers
+    latency: float = Field(ge=0)  # of a collective between two ranks
+    bandwidth: float = Field(gt=0)  # bytes a second
+
+    def seconds(self, points: float, ranks: int) -> float:
+        """Time of an evaluation with this many points in all."""
+        return self.computing(points, ranks) + self.collectives(points, ranks)
+
+    def computing(self, points: float, ranks: int) -> float:
+        """The part of it that a rank computes."""
+        return self.pair * points**2 / ranks + self.point * points + self.fixed
+
+    def collectives(self, points: float, ranks: int) -> float:
+        """The part of it that ranks exchange what they have computed."""
+        if ranks == 1:
+            return 0.0
+        volume = self.bytes_a_point * points * (ranks - 1) / ranks
+        return self.gathers * (self.latency * math.ceil(math.log2(ranks)) + volume / self.bandwidth)
+
+    def efficiency(self, points: float, ranks: int) -> float:
+        """Speed-up over one rank, divided by the ranks."""
+        return self.seconds(points, 1) / (ranks * self.seconds(points, ranks))
+
+    def recommended_ranks(self, points: float, available: int) -> int:
+        """The most ranks, up to those available, that are still as efficient as `LEAST_EFFICIENCY`."""
+        enough = [
+            ranks for ranks in range(1, available + 1) if self.efficiency(points, ranks) >= LEAST_EFFICIENCY
+        ]
+        return max(enough, default=1)
+
+
+# Measured by `ensemble report scaling` on two ranks of one node (Xeon, 2 cores, shared memory).
+MEASURED: Final = ScalingModel(
+    pair=2.0e-8,
+    point=2.0e-6,
+    fixed=1.0e-4,
+    gathers=8.0,
+    bytes_a_point=16.0,
+    latency=2.0e-5,
+    bandwidth=2.0e9,
+)
+
+
+def recommended_ranks(scene: Scene, available: int, model: ScalingModel = MEASURED) -> int:
+    """How many of the available ranks a run of this scene is worth."""
+    points = scene.numerics.points
+    on_each = _AUTOMATIC_POINTS if points == "auto" else points
+    return model.recommended_ranks(len(independent_vesicles(scene)) * on_each, available)
