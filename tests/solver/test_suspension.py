@@ -175,7 +175,7 @@ def test_adhesion_between_far_vesicles_needs_few_of_their_points() -> None:
     parameters = Adhesion(hamaker=1.0, distance=0.4)
     near = Neighbors(geometry, 6.0)
     found = SummedAdhesion(parameters, 1e-7, SERIAL).density(geometry, near)
-    expected = FewAdhesion(parameters, 1e-12).density(geometry, Closeness(geometry))
+    expected = FewAdhesion(parameters, 1e-7).density(geometry, Closeness(geometry))
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6 * np.max(np.abs(expected)))
 
 
