@@ -12,6 +12,7 @@ from ensemble.study import Study
 from solver.scene import Scene
 
 _AUTOMATIC_POINTS = 128  # what "auto" is taken for: most scenes end with fewer
+_CONTRAST = 8.0  # how much longer a step takes with a viscosity contrast: at 64 points 5 to 9 times, measured
 
 
 def estimate(asked: Study | Scene, maximum: float) -> Estimate:
@@ -28,6 +29,8 @@ def _of_run(scene: Scene) -> float:
     time = scene.horizon * scene.criteria.extensions
     if scene.start.relaxed:
         time += scene.start.horizon
+    if any(vesicle.viscosity_contrast != 1 for vesicle in scene.vesicles):
+        time *= _CONTRAST
     points = scene.numerics.points
     return float(len(scene.vesicles) * (_AUTOMATIC_POINTS if points == "auto" else points) * time)
 

@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 # Fractions and weights of rules on the line from the nearest source to the target: its end, Gauss–Legendre.
-_END = np.ones((2, 1))
+END = np.ones((2, 1))
 _SHORT_LINE, _LONG_LINE = (
     np.stack([(nodes + 1) / 2, weights / 2])
     for nodes, weights in (np.polynomial.legendre.leggauss(order) for order in (6, 16))
@@ -93,7 +93,7 @@ def _boundary_values(points: Array, tangents: Array, derivative: Array) -> tuple
 
 
 @compiled
-def _continue(
+def continuation_weights(
     offsets: Array,
     tangents: Array,
     spacing: float,
@@ -166,8 +166,8 @@ def _continuations(
             offsets[1, j] = sources[1, j] - sources[1, start]
         step = complex(targets[0, i] - sources[0, start], targets[1, i] - sources[1, start])
         line = _SHORT_LINE if squares[start] < (_SHORT * spacing) ** 2 else _LONG_LINE
-        _continue(offsets, tangents, spacing, step, 1.0 + 0.0j, _END, work, at[i])
-        _continue(offsets, tangents, spacing, step, step, line, work, along[i])
+        continuation_weights(offsets, tangents, spacing, step, 1.0 + 0.0j, END, work, at[i])
+        continuation_weights(offsets, tangents, spacing, step, step, line, work, along[i])
     return at, along, starts
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from solver import curve, scene
 from solver.contacts import CONTACT, cluster_sizes, clusters
-from solver.dynamics import Motion
+from solver.dynamics import Dynamics, Motion
 from solver.equation import EquationOfMotion
 from solver.geometry import Geometry, Membranes
 from solver.orbit import Orbit
@@ -76,6 +76,11 @@ def measures(setting: scene.Scene, dynamics: EquationOfMotion) -> dict[str, Meas
         found["viscosity_bending_tension"] = lambda motion: scale * membrane_stress(motion)
         if adhesion:
             found["viscosity_adhesion"] = lambda motion: scale * adhesion_stress(motion)
+        contrast = dynamics.contrast if isinstance(dynamics, Dynamics) else None
+        if contrast:
+            found["viscosity_contrast"] = lambda motion: (
+                scale * contrast.stress(motion.geometry, motion.velocity)
+            )
     return found
 
 

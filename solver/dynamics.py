@@ -1,7 +1,8 @@
 """The equation of motion: how tangent angles and centers change.
 
 The membranes move with the fluid, u = u_∞ + S[f_bending + f_adhesion + f_tension], and do not stretch.  In
-tangent angle and center that reads θ_t = n · u_s and c_t = mean(u).
+tangent angle and center that reads θ_t = n · u_s and c_t = mean(u).  Where the fluid inside a vesicle has
+another viscosity than that outside, both terms of u are changed (`contrast`).
 
 `Dynamics.of` is the one place where a scene becomes the terms that it has.  What a scene does not have is
 never constructed.
@@ -17,15 +18,19 @@ from numpy.typing import NDArray
 
 from solver.adhesion import Adhesion
 from solver.bending import Bending
+from solver.contrast import ViscosityContrast, contrasts
 from solver.flow import ImposedFlow, imposed_flow
 from solver.geometry import Geometry, Membranes
 from solver.gliding import glide, gliding_direction, gliding_speed, gliding_speed_by_curvature
 from solver.parallel import SERIAL, Parallel
 from solver.proximity import Closeness, Proximity
+from solver.scene import Adhesion as AdhesionParameters
 from solver.scene import Numerics, Scene
 from solver.spectral import differentiation, highest_modes, integration
 from solver.stokes import SingleLayer
+from solver.symmetry import independent_vesicles
 from solver.tension import ROUND_OFF, Inextensibility
+from solver.truncated_adhesion import TruncatedAdhesion
 
 Array = NDArray[np.float64]
 
@@ -61,11 +66,22 @@ def state_change(motion: Motion) -> Array:
     return np.concatenate([turning.ravel(), motion.velocity.sum(axis=2).ravel() / points])
 
 
+def _adhesion(
+    parameters: AdhesionParameters | None, accuracy: float, membranes: Membranes, parallel: Parallel
+) -> Adhesion | None:
+    """The adhesion that several vesicles have."""
+    if parameters is None:
+        return None
+    if parameters.cutoff is not None:
+        return TruncatedAdhesion(parameters, accuracy, membranes)
+    return Adhesion(parameters, accuracy, parallel)
+
+
 @dataclass
 class Dynamics:
     """Right-hand side and Jacobian of the equation of motion.
 
-    ``adhesion`` and ``flow`` are None for a scene without.
+    ``adhesion``, ``flow`` and ``contrast`` are None for a scene without.
     """
 
     membranes: Membranes
@@ -74,6 +90,7 @@ class Dynamics:
     flow: ImposedFlow | None
     inextensibility: Inextensibility
     layer: SingleLayer
+    contrast: ViscosityContrast | None = None
     evaluations: int = field(default=0, init=False)
 
     @classmethod
@@ -82,13 +99,16 @@ class Dynamics:
         membranes = Membranes.of_scene(scene)
         several = membranes.curves > 1
         accuracy = accuracy_of(scene.numerics)
+        contrast = contrasts(independent_vesicles(scene))
+        differ = bool(np.any(contrast != 1))
         return cls(
             membranes=membranes,
             bending=Bending(),
-            adhesion=Adhesion(scene.adhesion, accuracy, parallel) if scene.adhesion and several else None,
+            adhesion=_adhesion(scene.adhesion, accuracy, membranes, parallel) if several else None,
             flow=imposed_flow(scene.flow, membranes) if scene.flow else None,
             inextensibility=Inextensibility(accuracy, 1e-3 * accuracy if several else ROUND_OFF),
             layer=SingleLayer(membranes, accuracy, parallel),
+            contrast=ViscosityContrast(contrast, membranes, accuracy) if differ else None,
         )
 
     def motion(self, state: Array) -> Motion:
@@ -104,7 +124,9 @@ class Dynamics:
         velocity = self.layer.velocity(density * self.membranes.spacing[:, None])
         if self.flow:
             velocity += self.flow.velocity(geometry)
-        free = self.inextensibility.solve(self.layer, geometry, velocity)
+        if self.contrast:
+            velocity = self.contrast.velocity(velocity)
+        free = self.inextensibility.solve(self.contrast or self.layer, geometry, velocity)
         return Motion(geometry, closeness, free.velocity, free.turning, free.tension, bending, adhesion)
 
     def rate(self, state: Array) -> Array:
@@ -150,11 +172,14 @@ class Dynamics:
         velocity += self.layer.jacobian(geometry, self._point_forces(motion))
         if flow is not None:
             velocity += flow
+        if self.contrast:
+            velocity += self.contrast.jacobian(geometry, motion.velocity)
+            velocity = self.contrast.velocity(velocity)
         stretching = self.inextensibility.stretching(geometry, velocity)
         every_point = np.arange(motion.turning.size)
         stretching[every_point, every_point] += motion.turning.ravel()
         stretching *= weights
-        inverse, tension_flow = self.inextensibility.factorize(self.layer, geometry)
+        inverse, tension_flow = self.inextensibility.factorize(self.contrast or self.layer, geometry)
         velocity += tension_flow @ (inverse @ stretching)
         return self._rate_columns(motion, velocity)
 
@@ -182,6 +207,8 @@ class Dynamics:
         geometry = Geometry(self.membranes, state)
         closeness = Closeness(geometry) if self.membranes.curves > 1 else None
         self.layer.assemble(geometry, closeness)
+        if self.contrast:
+            self.contrast.assemble(geometry, closeness, self.layer)
         return geometry, closeness
 
     def point_derivatives(self, geometry: Geometry) -> Array:

@@ -17,16 +17,22 @@ from solver.equation import EquationOfMotion
 from solver.orbit import Orbit
 from solver.run import Outcome
 from solver.scene import Criteria, Extension, Scene, Shear, Trap
+from solver.turns import LongAxis
 
 
 @dataclass(frozen=True)
 class History:
-    """The run so far: recorded diagnostics by name, the last state and the line of centers (two vesicles)."""
+    """The run so far: recorded diagnostics by name, the last state and the lines that are followed.
+
+    orbit : of two vesicles
+    axis : of one that may tumble (`may_tumble`)
+    """
 
     samples: Mapping[str, Sequence[float]]
     dynamics: EquationOfMotion
     orbit: Orbit | None
     state: np.ndarray
+    axis: LongAxis | None = None
 
 
 class Criterion(Protocol):
@@ -69,6 +75,18 @@ class Revolved:
         before = gap[(time >= earlier) & (time <= previous)].max(initial=0.0)
         after = gap[(time >= previous) & (time <= last)].max(initial=0.0)
         return Outcome.BOUND if after <= (1 + self._growth) * before else None
+
+
+class Tumbled:
+    """The long axis of a single vesicle has made full turns."""
+
+    def __init__(self, criteria: Criteria) -> None:
+        self._half_turns = 2 * criteria.revolutions
+
+    def decide(self, history: History) -> Outcome | None:
+        """See `Criterion`."""
+        assert history.axis
+        return Outcome.TUMBLING if len(history.axis.half_turns) > self._half_turns else None
 
 
 class Steady:
@@ -114,11 +132,18 @@ def criteria_of(scene: Scene) -> tuple[Criterion, ...]:
     """The criteria that apply to a scene, in the order in which they are asked."""
     pair = len(scene.vesicles) == 2
     found: list[Criterion] = [Separated()] if pair else []
+    if may_tumble(scene):
+        found.append(Tumbled(scene.criteria))
     if pair and isinstance(scene.flow, Shear):
         found.append(Revolved(scene.criteria))
     else:
         found.append(Steady(scene))
     return tuple(found)
+
+
+def may_tumble(scene: Scene) -> bool:
+    """Whether the scene is a single vesicle in shear that has a long axis."""
+    return len(scene.vesicles) == 1 and isinstance(scene.flow, Shear) and scene.vesicles[0].reduced_area < 1
 
 
 def latest_time(scene: Scene) -> float:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from solver.orbit import Orbit
 from solver.run import Outcome, Series, Viscosity
 from solver.scene import Extension, Scene, Shear, Trap
+from solver.turns import Turns
 
 
 def effective_aspect_ratio(period: float | None, scene: Scene) -> float | None:
@@ -31,7 +31,7 @@ def inclination(scene: Scene, series: Series) -> float | None:
     return None
 
 
-def viscosity(scene: Scene, series: Series, outcome: Outcome, orbit: Orbit | None) -> Viscosity | None:
+def viscosity(scene: Scene, series: Series, outcome: Outcome, turns: Turns | None) -> Viscosity | None:
     """As `solver.run.Viscosity` says which average it is; None while it does not exist."""
     if "viscosity_bending_tension" not in series:
         return None
@@ -41,7 +41,7 @@ def viscosity(scene: Scene, series: Series, outcome: Outcome, orbit: Orbit | Non
             return float(series[name][-1])
 
     else:
-        interval = _averaged_over(scene, series, orbit)
+        interval = _averaged_over(scene, series, turns)
         if interval is None:
             return None
         first, last = interval
@@ -50,16 +50,17 @@ def viscosity(scene: Scene, series: Series, outcome: Outcome, orbit: Orbit | Non
             return float(CubicSpline(series["time"], series[name]).integrate(first, last)) / (last - first)
 
     membrane = average("viscosity_bending_tension")
-    if "viscosity_adhesion" not in series:
-        return Viscosity(total=membrane, bending_tension=membrane, adhesion=None)
-    adhesion = average("viscosity_adhesion")
-    return Viscosity(total=membrane + adhesion, bending_tension=membrane, adhesion=adhesion)
+    adhesion, contrast = (
+        average(name) if name in series else None for name in ("viscosity_adhesion", "viscosity_contrast")
+    )
+    total = membrane + (adhesion or 0.0) + (contrast or 0.0)
+    return Viscosity(total=total, bending_tension=membrane, adhesion=adhesion, contrast=contrast)
 
 
-def _averaged_over(scene: Scene, series: Series, orbit: Orbit | None) -> tuple[float, float] | None:
+def _averaged_over(scene: Scene, series: Series, turns: Turns | None) -> tuple[float, float] | None:
     """From when to when the viscosity of a run that is not steady is averaged; None while it cannot be."""
-    if orbit:
-        return (orbit.half_turns[-3], orbit.half_turns[-1]) if orbit.period else None
+    if turns:
+        return (turns.half_turns[-3], turns.half_turns[-1]) if turns.period else None
     if len(scene.vesicles) == 1 or len(series["time"]) < 2:
         return None
     return float(series["time"][-1]) / 2, float(series["time"][-1])

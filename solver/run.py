@@ -22,21 +22,27 @@ class Outcome(StrEnum):
     SEPARATED = "separated"
     EQUILIBRIUM = "equilibrium"
     STEADY = "steady"
+    TUMBLING = "tumbling"
     UNDECIDED = "undecided"
     FAILED = "failed"
 
 
 @dataclass(frozen=True)
 class Viscosity:
-    """Intrinsic viscosity −∫ f_x y ds/(rate·area), averaged over time; no adhesion part without adhesion.
+    """Intrinsic viscosity −∫ f_x y ds/(rate·area) by force, averaged over time.
 
-    It is taken over a pair's last full turn, over the second half of a run of three or more vesicles, and
-    otherwise from the steady state.  A suspension with the area fraction φ has the viscosity 1 + φ·[μ].
+    ``contrast`` is what fluids inside add whose viscosity differs.  No adhesion part without adhesion, and
+    none of a contrast without one.
+
+    It is taken over a full turn, the last one, of a pair or of a tumbling vesicle, over the second half of a
+    run of three or more vesicles, and otherwise from the steady state.  A suspension with the area fraction φ
+    has the viscosity 1 + φ·[μ].
     """
 
     total: float
     bending_tension: float
     adhesion: float | None
+    contrast: float | None = None
 
 
 @dataclass(frozen=True)
@@ -86,9 +92,10 @@ class Work:
 # Diagnostics by name, each of shape (time,) and sampled at `Series["time"]`.  Always present: time,
 # bending_energy, area_error, closure_error, state_rate.  With two or more vesicles: gap.  With exactly two:
 # center_distance, center_angle (of the line of centers, radians, unwrapped).  With adhesion:
-# adhesion_energy.  In shear: viscosity_bending_tension and, with adhesion, viscosity_adhesion.  With one
-# vesicle: inclination_angle (radians).  With three or more vesicles and adhesion: clusters (their number,
-# single vesicles included) and largest_cluster (vesicles in it); `contacts` says what a cluster is.
+# adhesion_energy.  In shear: viscosity_bending_tension and, with adhesion, viscosity_adhesion and, with a
+# contrast, viscosity_contrast.  With one vesicle: inclination_angle (radians).  With three or more vesicles
+# and adhesion: clusters (their number, single vesicles included) and largest_cluster (vesicles in it);
+# `contacts` says what a cluster is.
 Series = Mapping[str, Array]
 
 # What is measured of every vesicle where there are three or more, sampled at `Series["time"]`, by name:

@@ -14,7 +14,7 @@ from solver.diagnostics import Recorder
 from solver.geometry import Membranes
 from solver.integrators import StepFailedError
 from solver.orbit import Orbit
-from solver.outcome import History, criteria_of, latest_time
+from solver.outcome import History, criteria_of, latest_time, may_tumble
 from solver.parallel import SERIAL, Parallel, first_rank_asks
 from solver.resolution import UnresolvedError, carried, resolution_of, with_points
 from solver.run import LARGEST_SPATIAL, Energy, Errors, Outcome, Run, Work
@@ -22,6 +22,7 @@ from solver.scene import Scene, Shear, Start
 from solver.stage import Cost, Stage
 from solver.start import placed_state, turned_state
 from solver.tension import TensionNotFoundError
+from solver.turns import LongAxis, Turns
 
 Array = NDArray[np.float64]
 
@@ -77,6 +78,8 @@ def simulate(
     orbit = None
     if len(scene.vesicles) == 2:
         orbit = Orbit(stage.membranes, start.state, scene.criteria.separated_distance)
+    axis = LongAxis(stage.membranes, start.state) if may_tumble(scene) else None
+    turns: Turns | None = orbit or axis
     recorder = Recorder(scene, stage.dynamics, orbit)
     criteria = criteria_of(scene)
     progress = _Progress(0.0, start.state)
@@ -94,21 +97,21 @@ def simulate(
                 progress.state = carried(coarse, progress.state, stage.membranes)
                 progress.rejected += 1
                 recorder.continue_with(stage.dynamics)
-                if orbit:
-                    orbit.membranes = stage.membranes
+                if turns:
+                    turns.membranes = stage.membranes
                 stage.begin(progress.time, progress.state, latest)
                 continue
             if step.end < latest or progress.smallest_step is None:  # the last one ends where the run does
                 taken = float(step.end - step.start)
                 progress.smallest_step = min(progress.smallest_step or taken, taken)
-            if orbit:
-                step = orbit.advance(step)
+            if turns:
+                step = turns.advance(step)
             _record_up_to(step.end, step.interpolate, recorder, scene.output.interval)
             progress.time, progress.state = step.end, step.state
             progress.steps += 1
             progress.rejected += step.shortened
             progress.temporal_error += step.local_error
-            history = History(recorder.values, stage.dynamics, orbit, step.state)
+            history = History(recorder.values, stage.dynamics, orbit, step.state, axis)
             decisions = (criterion.decide(history) for criterion in criteria)
             outcome = next((decision for decision in decisions if decision), Outcome.UNDECIDED)
             if stage.cost.evaluations > scene.numerics.work_limit:
@@ -134,7 +137,7 @@ def simulate(
         smallest_step=progress.smallest_step,
         points=stage.membranes.points,
     )
-    return _summary(scene, outcome, failure, progress, orbit, recorder, work)
+    return _summary(scene, outcome, failure, progress, turns, recorder, work)
 
 
 @dataclass(frozen=True)
@@ -181,12 +184,12 @@ def _summary(
     outcome: Outcome,
     failure: str | None,
     progress: _Progress,
-    orbit: Orbit | None,
+    turns: Turns | None,
     recorder: Recorder,
     work: Work,
 ) -> Run:
     series = recorder.series
-    period = orbit.period if orbit and isinstance(scene.flow, Shear) else None
+    period = turns.period if turns and isinstance(scene.flow, Shear) else None
     adhesion_energy = series.get("adhesion_energy")
     return Run(
         scene=scene,
@@ -197,7 +200,7 @@ def _summary(
         effective_aspect_ratio=results.effective_aspect_ratio(period, scene),
         inclination_angle=results.inclination(scene, series),
         gap=float(series["gap"][-1]) if "gap" in series else None,
-        viscosity=results.viscosity(scene, series, outcome, orbit),
+        viscosity=results.viscosity(scene, series, outcome, turns),
         energy=Energy(
             bending=float(series["bending_energy"][-1]),
             adhesion=None if adhesion_energy is None else float(adhesion_energy[-1]),

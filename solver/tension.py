@@ -12,7 +12,7 @@ move, because A does not change when a membrane is turned or shifted.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,6 @@ from scipy.linalg import lapack
 from solver.compilation import compiled
 from solver.geometry import Geometry
 from solver.spectral import differentiation
-from solver.stokes import SingleLayer
 
 Array = NDArray[np.float64]
 
@@ -30,6 +29,15 @@ ROUND_OFF = 1e-15  # the least `Inextensibility.elasticity` that means anything
 
 class TensionNotFoundError(ArithmeticError):
     """The iteration for the tension did not converge."""
+
+
+class Mobility(Protocol):
+    """How point forces move the membranes: the single-layer potential, or what a contrast makes of it.
+
+    matrix : (2·M·N, 2·M·N), symmetric up to quadrature error
+    """
+
+    matrix: Array
 
 
 class Inextensible(NamedTuple):
@@ -135,7 +143,7 @@ class Inextensibility:
         self.inverse: Array | None = None
         self.shift = 0.0
 
-    def solve(self, layer: SingleLayer, geometry: Geometry, imposed: Array) -> Inextensible:
+    def solve(self, layer: Mobility, geometry: Geometry, imposed: Array) -> Inextensible:
         """The motion when all forces but the tension, and the flow, cause the velocity ``imposed`` (2, M, N).
 
         Raises
@@ -169,7 +177,7 @@ class Inextensibility:
                 return found
         raise TensionNotFoundError("the tension could not be found: the membrane is too distorted")
 
-    def factorize(self, layer: SingleLayer, geometry: Geometry) -> tuple[Array, Array]:
+    def factorize(self, layer: Mobility, geometry: Geometry) -> tuple[Array, Array]:
         """Make the dense inverse for this geometry.
 
         Returns

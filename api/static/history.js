@@ -63,6 +63,7 @@ const PANELS = [
     curves: [
       { series: "viscosity_bending_tension", name: "bending + tension", color: "bound" },
       { series: "viscosity_adhesion", name: "adhesion", color: "separated" },
+      { series: "viscosity_contrast", name: "viscosity contrast", color: "end-to-end" },
     ],
   },
 ];

@@ -16,6 +16,7 @@ export const MARKS = {
   separated: { color: "separated", symbol: "x", glyph: "✕" },
   equilibrium: { color: "equilibrium", symbol: "triangle-up", glyph: "▲" },
   steady: { color: "steady", symbol: "triangle-down", glyph: "▼" },
+  tumbling: { color: "muted", symbol: "cross", glyph: "✚" },
   undecided: { color: "undecided", symbol: "diamond-open", glyph: "◇" },
   failed: { color: "ink", symbol: "cross-thin-open", glyph: "+" },
 };

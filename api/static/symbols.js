@@ -18,6 +18,8 @@ const BY_PATH = {
   "vesicles.reduced_area": { name: "reduced area", symbol: "ΔA" },
   "vesicles.length": { name: "vesicle length", symbol: "L" },
   "vesicles.bending_modulus": { name: "bending modulus", symbol: "κ" },
+  "vesicles.viscosity_contrast": { name: "viscosity contrast", symbol: "λ" },
+  "adhesion.cutoff": { name: "cutoff of the attraction", symbol: "r_c" },
 };
 
 const MOST_NUMBERS = 3; // that are listed
@@ -47,13 +49,18 @@ export function quantity(path, scene) {
  * @returns {string}
  */
 export function describe(scene, without = []) {
-  const areas = new Set(scene.vesicles.map((/** @type {any} */ vesicle) => vesicle.reduced_area));
+  const of = (/** @type {string} */ field) =>
+    [...new Set(scene.vesicles.map((/** @type {any} */ vesicle) => vesicle[field] ?? 1))].sort((a, b) => a - b);
+  const contrasts = of("viscosity_contrast");
+  const cutoff = scene.adhesion?.cutoff ?? null;
   /** @type {[string, unknown[]][]} */
   const values = [
     ["flow.rate", scene.flow ? [scene.flow.rate] : []],
-    ["vesicles.reduced_area", [...areas].sort()],
+    ["vesicles.reduced_area", of("reduced_area")],
+    ["vesicles.viscosity_contrast", contrasts.every((contrast) => contrast === 1) ? [] : contrasts],
     ["adhesion.hamaker", scene.adhesion ? [scene.adhesion.hamaker] : []],
     ["adhesion.distance", scene.adhesion ? [scene.adhesion.distance] : []],
+    ["adhesion.cutoff", cutoff === null ? [] : [cutoff]],
   ];
   const shown = values
     .filter(([path, numbers]) => numbers.length > 0 && !without.includes(path))

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import MultipleLocator
 
-from ensemble.figures.style import BLACK, BLUE, GRAY, VERMILLION
+from ensemble.figures.style import BLACK, BLUE, GRAY, GREEN, VERMILLION
 from ensemble.figures.symbols import DISTANCE
 from solver.run import Run
 
@@ -52,7 +52,11 @@ def _draw_parts(axes: Axes, run: Run, membrane: str, label: str, adhesion: str) 
         axes.plot(
             run.series["time"], run.series[adhesion], color=VERMILLION, linestyle="-.", label="adhesion"
         )
-    axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=2, borderaxespad=0.2)
+    _label_parts(axes)
+
+
+def _label_parts(axes: Axes) -> None:
+    axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=3, borderaxespad=0.2, columnspacing=1.0)
 
 
 def _draw_energy(axes: Axes, run: Run) -> None:
@@ -62,6 +66,10 @@ def _draw_energy(axes: Axes, run: Run) -> None:
 
 def _draw_viscosity(axes: Axes, run: Run) -> None:
     _draw_parts(axes, run, "viscosity_bending_tension", "bending + tension", "viscosity_adhesion")
+    if "viscosity_contrast" in run.series:
+        contrast = run.series["viscosity_contrast"]
+        axes.plot(run.series["time"], contrast, color=GREEN, linestyle=":", label="contrast")
+        _label_parts(axes)
     axes.set_ylabel(r"intrinsic viscosity $[\mu]$")
 
 

@@ -82,6 +82,7 @@ MARKS: Final[dict[Outcome, Mark]] = {
     Outcome.SEPARATED: Mark.filled(VERMILLION, "X"),
     Outcome.EQUILIBRIUM: Mark.filled(SKY, "^"),
     Outcome.STEADY: Mark.filled(PURPLE, "v"),
+    Outcome.TUMBLING: Mark.filled(GRAY, "P"),
     Outcome.UNDECIDED: Mark.hollow(ORANGE, "D"),
     Outcome.FAILED: Mark.hollow(BLACK, "+"),
 }

@@ -36,6 +36,8 @@ _BY_PATH = {
     "vesicles.reduced_area": Quantity.named("reduced area", r"\Delta A"),
     "vesicles.length": Quantity.named("vesicle length", "L"),
     "vesicles.bending_modulus": Quantity.named("bending modulus", r"\kappa_b"),
+    "vesicles.viscosity_contrast": Quantity.named("viscosity contrast", r"\lambda"),
+    "adhesion.cutoff": Quantity.named("cutoff of the attraction", r"r_c"),
 }
 
 _MOST_NUMBERS = 3  # that are listed
@@ -60,7 +62,7 @@ def quantity(path: str, flow: str | None) -> Quantity:
 
 
 def describe(scene: Scene, without: Collection[str] = ()) -> str:
-    """One line on a scene: flow, rate, reduced area, Hamaker constant and distance, as far as it has them.
+    """One line on a scene: its flow, and its parameters as far as it has them and they tell it from others.
 
     Parameters
     ----------
@@ -72,9 +74,14 @@ def describe(scene: Scene, without: Collection[str] = ()) -> str:
     if scene.flow is not None:
         values["flow.rate"] = [scene.flow.rate]
     values["vesicles.reduced_area"] = sorted({vesicle.reduced_area for vesicle in scene.vesicles})
+    contrasts = sorted({vesicle.viscosity_contrast for vesicle in scene.vesicles})
+    if contrasts != [1.0]:
+        values["vesicles.viscosity_contrast"] = contrasts
     if scene.adhesion is not None:
         values["adhesion.hamaker"] = [scene.adhesion.hamaker]
         values["adhesion.distance"] = [scene.adhesion.distance]
+        if scene.adhesion.cutoff is not None:
+            values["adhesion.cutoff"] = [scene.adhesion.cutoff]
     flow = None if scene.flow is None else scene.flow.kind
     count = len(scene.vesicles)
     words = [f"{count} vesicles" if count > 1 else "1 vesicle", f"in {_FLOW_WORDS[flow]}"]

@@ -19,14 +19,16 @@ from ensemble.study import Study, load_scene, load_study, preset_names
 from solver.run import Outcome
 from solver.scene import Adhesion, Scene, Shear, Trap
 
-STUDIES = (
+DOUBLET_STUDIES = (
     "critical-extension-hamaker",
     "critical-extension-rate",
+    "critical-hamaker-contrast",
     "critical-hamaker-reduced-area",
     "critical-hamaker-short-range",
     "critical-hamaker",
     "critical-separation-rate",
 )
+STUDIES = (*DOUBLET_STUDIES, "critical-viscosity-contrast")
 PUBLISHED = (
     "doublet-draining",
     "doublet-equilibrium",
@@ -36,7 +38,8 @@ PUBLISHED = (
     "pair-extension",
     "vesicle-shear",
 )
-SCENES = (*PUBLISHED, "cluster-quiescent", "suspension-shear")
+MANY = ("cluster-quiescent", "suspension-shear")
+SCENES = (*PUBLISHED, *MANY, "doublet-unequal")
 
 HAMAKER = load_study("critical-hamaker")
 GRID = GeometricGrid(HAMAKER.search.tolerance)
@@ -67,12 +70,13 @@ def test_every_preset_says_what_it_is_and_where_it_comes_from(name: str) -> None
         Path(__file__).parents[2].joinpath("ensemble", "presets", f"{name}.toml").read_text(encoding="utf-8")
     )
     comment = [line for line in text.split("\n\n")[0].splitlines() if line.startswith("# ")]
-    assert any("Quaife, Veerapaneni and Young" in line for line in comment)
+    sources = ("Quaife, Veerapaneni and Young", "Keller and Skalak")
+    assert any(source in line for line in comment for source in sources)
 
 
 def test_no_doublet_starts_in_contact() -> None:
     scenes = [load_scene(name) for name in PUBLISHED]
-    for study in map(load_study, STUDIES):
+    for study in map(load_study, DOUBLET_STUDIES):
         scenes += [study.scene_at(sweep_value, study.search.limits[0]) for sweep_value in study.sweep.values]
     doublets = [scene.vesicles for scene in scenes if len(scene.vesicles) == 2]
     assert len(doublets) == len(scenes) - 1
@@ -100,7 +104,7 @@ def test_parameters_of_the_published_scenes() -> None:
     assert single.adhesion is None
 
 
-@pytest.mark.parametrize("name", ["cluster-quiescent", "suspension-shear"])
+@pytest.mark.parametrize("name", MANY)
 def test_tens_of_vesicles_begin_within_reach_of_adhesion_but_apart(name: str) -> None:
     scene = load_scene(name)
     assert len(scene.vesicles) == 24
@@ -130,6 +134,7 @@ def test_sides_of_outcomes() -> None:
         Outcome.END_TO_END: Side.UNDECIDED,
         Outcome.EQUILIBRIUM: Side.UNDECIDED,
         Outcome.STEADY: Side.UNDECIDED,
+        Outcome.TUMBLING: Side.UNDECIDED,
     }
     trap = load_study("critical-extension-rate")
     assert trap.side(Outcome.BOUND) is Side.LOW

@@ -55,3 +55,21 @@ def smooth_direction(membranes: Membranes, seed: int = 3) -> Array:
 def geometry_of(scene: Scene) -> Geometry:
     """The geometry in which a scene begins."""
     return Geometry(Membranes.of_scene(scene), placed_state(scene))
+
+
+def with_contrasts(scene: Scene, *contrasts: float) -> Scene:
+    """The scene with these viscosity contrasts of its vesicles."""
+    vesicles = tuple(
+        vesicle.model_copy(update={"viscosity_contrast": contrast})
+        for vesicle, contrast in zip(scene.vesicles, contrasts, strict=True)
+    )
+    return scene.model_copy(update={"vesicles": vesicles})
+
+
+def closing(membranes: Membranes, state: Array, direction: Array) -> Array:
+    """The direction without what would open the curves of a state."""
+    angle, change = membranes.tangent_angle(state), membranes.tangent_angle(direction).copy()
+    for vesicle in range(membranes.count):
+        tangents = np.stack([np.cos(angle[vesicle]), np.sin(angle[vesicle])], axis=1)
+        change[vesicle] -= tangents @ np.linalg.lstsq(tangents, change[vesicle])[0]
+    return membranes.pack(change, membranes.center(direction))

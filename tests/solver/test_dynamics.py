@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from solver import contrast as contrast_module
 from solver import dynamics as dynamics_module
 from solver import flow as flow_module
 from solver.dynamics import Dynamics
@@ -99,6 +100,9 @@ def test_forces_feed_what_the_fluid_dissipates() -> None:
 TERMS = [
     (dynamics_module, "Adhesion"),
     (dynamics_module, "Closeness"),
+    (dynamics_module, "TruncatedAdhesion"),
+    (dynamics_module, "ViscosityContrast"),
+    (contrast_module, "DoubleLayer"),
     (flow_module, "LinearFlow"),
     (flow_module, "TrapFlow"),
 ]
@@ -120,6 +124,7 @@ def constructed(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
 
 
 VESICLE, OTHER = Vesicle(center=(-1.5, 0.0)), Vesicle(center=(1.5, 0.0))
+VISCOUS = Vesicle(center=(-1.5, 0.0), viscosity_contrast=3.0)
 ADHESION = Adhesion(hamaker=1.0, distance=0.4)
 
 
@@ -137,6 +142,12 @@ ADHESION = Adhesion(hamaker=1.0, distance=0.4)
             {"vesicles": (VESICLE, OTHER), "adhesion": ADHESION, "flow": Shear(rate=0.5)},
             {"Closeness", "Adhesion", "LinearFlow"},
         ),
+        (
+            {"vesicles": (VESICLE, OTHER), "adhesion": ADHESION.model_copy(update={"cutoff": 1.0})},
+            {"Closeness", "TruncatedAdhesion"},
+        ),
+        ({"vesicles": (VISCOUS,)}, {"ViscosityContrast", "DoubleLayer"}),
+        ({"vesicles": (VISCOUS, OTHER)}, {"Closeness", "ViscosityContrast", "DoubleLayer"}),
     ],
 )
 def test_terms_that_a_scene_lacks_are_never_constructed(

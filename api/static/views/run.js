@@ -103,6 +103,7 @@ function results({ period, gap, inclination_angle, viscosity, energy, error, wor
       ["Viscosity [μ]", known(viscosity?.total)],
       ["– bending + tension", known(viscosity?.bending_tension)],
       ["– adhesion", known(viscosity?.adhesion)],
+      ["– viscosity contrast", known(viscosity?.contrast)],
       ["Bending energy", known(energy.bending)],
       ["Adhesion energy", known(energy.adhesion)],
       ["Area error", number(error.area, 2)],
