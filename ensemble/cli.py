@@ -302,17 +302,22 @@ def report(
     only: Annotated[
         list[str], typer.Option(metavar="SECTION", help="Of the paper, only this section.  Repeatable.")
     ] = [],  # noqa: B006
+    ranks_per_run: RanksPerRun = None,
     store: StorePath = DEFAULT_STORE,
     as_json: AsJson = False,
 ) -> None:
-    """Measure the solver (error against run time, extreme scenes), or recompute the paper on all ranks.
+    """Measure the solver (errors, extreme scenes, scaling over all ranks), or recompute the paper.
 
     The report is written into the store, which keeps its runs too: only what is missing is run.
     """
-    if name is ReportName.PAPER:
-        made = _paper(only, quick, store)
-    elif only:
+    if only and name is not ReportName.PAPER:
         raise BadInput(f"--only: the report {name} has no sections")
+    if ranks_per_run is not None and name is not ReportName.PAPER:
+        raise BadInput(f"--ranks-per-run: the report {name} chooses the ranks of its runs itself")
+    if name is ReportName.PAPER:
+        made = _paper(only, quick, store, ranks_per_run)
+    elif name is ReportName.SCALING:
+        made = _scaling(quick, store)
     else:
         made = _measurements(name, quick, store)
     if made is None:
@@ -327,23 +332,43 @@ def report(
         print(made.directory)
 
 
-def _paper(only: list[str], quick: bool, store: Path) -> Report | None:
+def _paper(only: list[str], quick: bool, store: Path, ranks_per_run: str | None) -> Report | None:
     """Make the paper's report on all ranks; None on all but the first."""
     from rich.console import Console
 
+    from ensemble.groups import chosen_ranks
     from ensemble.mpi import abort_guard, on_root, world
     from ensemble.report.paper.command import make_paper
     from ensemble.report.paper.sections import chosen
     from ensemble.report.progress import report_progress
     from ensemble.store import Store
+    from ensemble.study import load_scene
 
     with refusing():
         sections = chosen(only)
     communicator = world()
     with abort_guard(communicator):
+        # Its scenes have one vesicle or two.
+        ranks = chosen_ranks(ranks_per_run or "1", load_scene("doublet-shear"), communicator.Get_size())
         on_root(communicator, lambda: _create(store))
         with Store.existing(store) as opened, report_progress(Console(stderr=True)) as tell:
-            return make_paper(communicator, opened, sections, quick, tell)
+            return make_paper(communicator, opened, sections, quick, tell, ranks)
+
+
+def _scaling(quick: bool, store: Path) -> Report | None:
+    """Make the report on scaling on all ranks; None on all but the first."""
+    from rich.console import Console
+
+    from ensemble.mpi import abort_guard, on_root, world
+    from ensemble.report.progress import report_progress
+    from ensemble.report.scaling.command import make_scaling
+    from ensemble.store import Store
+
+    communicator = world()
+    with abort_guard(communicator):
+        on_root(communicator, lambda: _create(store))
+        with Store.existing(store) as opened, report_progress(Console(stderr=True)) as tell:
+            return make_scaling(communicator, opened, quick, tell)
 
 
 def _create(store: Path) -> None:

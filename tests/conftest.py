@@ -64,9 +64,13 @@ class Launcher:
 
 @pytest.fixture(scope="session")
 def launcher() -> Launcher:
-    """The launcher that belongs to the environment's MPI library."""
+    """The launcher that belongs to the environment's MPI library, or the one that MPIRUN names.
+
+    Another library than the environment's is loaded by mpi4py's own variables, for Debian's Open MPI
+    MPIRUN=/usr/bin/mpirun MPI4PY_MPIABI=openmpi MPI4PY_LIBMPI=libmpi.so.40.
+    """
     beside = Path(sys.executable).with_name("mpirun")
-    mpirun = str(beside) if beside.exists() else shutil.which("mpirun")
+    mpirun = os.environ.get("MPIRUN") or (str(beside) if beside.exists() else shutil.which("mpirun"))
     if mpirun is None:
         pytest.skip("no mpirun: install the extra mpich")
     return Launcher(mpirun)

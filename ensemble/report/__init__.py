@@ -11,4 +11,5 @@ class ReportName(StrEnum):
 
     WORK_PRECISION = "work-precision"
     STABILITY = "stability"
+    SCALING = "scaling"
     PAPER = "paper"

@@ -25,7 +25,12 @@ if TYPE_CHECKING:
 
 
 def make_paper(
-    communicator: Intracomm, store: Store, sections: Sequence[Section], quick: bool, tell: Tell
+    communicator: Intracomm,
+    store: Store,
+    sections: Sequence[Section],
+    quick: bool,
+    tell: Tell,
+    ranks_per_run: int = 1,
 ) -> Report | None:
     """Make the runs that the store does not have, then write ``reports/paper/`` in the store.
 
@@ -42,6 +47,8 @@ def make_paper(
         Minutes instead of an hour.
     tell : callable
         Takes a line about every run that has been made, on rank 0.
+    ranks_per_run : int
+        How many ranks compute a run together.
 
     Returns
     -------
@@ -51,7 +58,7 @@ def make_paper(
     begin, runs = time.perf_counter(), 0
     courses = _Courses(sections, Results(store), quick) if communicator.Get_rank() == 0 else None
     while (plan := communicator.bcast(courses.next_plan() if courses else None)) is not None:
-        runs += _carry_out(communicator, plan, store, tell)
+        runs += _carry_out(communicator, plan, store, tell, ranks_per_run)
     if courses is None:
         return None
     parts: list[Part] = []
@@ -105,17 +112,19 @@ class _Courses:
         return Plan(tuple(cases.values()), tuple(studies.values())) if plans else None
 
 
-def _carry_out(communicator: Intracomm, plan: Plan, store: Store, tell: Tell) -> int:
+def _carry_out(communicator: Intracomm, plan: Plan, store: Store, tell: Tell, ranks_per_run: int) -> int:
     """Make the runs of a plan on all ranks, and say how many."""
     cost = run_batch(
         communicator,
         [case.scene for case in plan.cases],
         store,
         lambda standing: tell(f"runs: {standing_text(standing)}"),
+        ranks_per_run,
     )
     runs = cost.runs
     for case in plan.studies:
-        runs += trace(communicator, case.study, store, _telling(case.study.name, tell)).cost.runs
+        telling = _telling(case.study.name, tell)
+        runs += trace(communicator, case.study, store, telling, ranks_per_run).cost.runs
     return runs
 
 

@@ -1,0 +1,110 @@
+"""From measurements to a model, and from the model to what cannot be measured here."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.optimize import nnls
+
+from ensemble.report.scaling.document import (
+    Collective,
+    Cost,
+    Crossover,
+    Evaluation,
+    Prediction,
+    Recommendation,
+)
+from ensemble.report.scaling.plan import POINTS
+from ensemble.scaling import MEASURED, ScalingModel
+from solver.scene import LARGEST_DENSE
+
+_RANKS = (10, 32, 100, 316, 1_000, 3_162, 10_000)
+_VESICLES = (2, 16, 64, 256, 1_024, 10_000)
+
+_TERMS = 30  # of an expansion, for about nine digits: an error like 2^−p
+_SUMS = 3  # of a harmonic potential each, that make a Stokeslet's velocity
+ASSUMPTION = (
+    "Greengard and Rokhlin, J. Comput. Phys. 73, 325 (1987): with s points in a box and p terms, each point "
+    "sums over 9s neighbors, and its box's share of 27 translations costs 27p²/s; s = √3·p is best.  "
+    f"Assumed: p = {_TERMS} (an error of about 2^−p), {_SUMS} harmonic sums for a Stokeslet's velocity, and "
+    "a multiplication of a translation as dear as a pair of the direct sum."
+)
+
+
+def model_of(
+    costs: Sequence[Cost], evaluations: Sequence[Evaluation], collectives: Sequence[Collective]
+) -> ScalingModel:
+    """Fit the constants, each measured point counting by its relative error.
+
+    Latency and bandwidth are those of an earlier measurement where there is a single rank.
+    """
+    many = [cost for cost in costs if cost.vesicles > LARGEST_DENSE]
+    points = np.array([POINTS * cost.vesicles for cost in many], dtype=float)
+    seconds = np.array([cost.seconds for cost in many])
+    terms = np.stack([points**2, points, np.ones_like(points)], axis=1)
+    pair, point, fixed = nnls(terms / seconds[:, None], np.ones_like(seconds))[0]
+    shared = [found for found in evaluations if found.vesicles > LARGEST_DENSE]
+    gathers = float(np.mean([found.gathers for found in shared]))
+    bytes_a_point = float(
+        np.mean([found.gathered_bytes / found.gathers / (POINTS * found.vesicles) for found in shared])
+    )
+    latency, bandwidth = _of_collectives(collectives)
+    return ScalingModel(
+        pair=pair,
+        point=point,
+        fixed=fixed,
+        gathers=gathers,
+        bytes_a_point=bytes_a_point,
+        latency=latency,
+        bandwidth=bandwidth,
+    )
+
+
+def _of_collectives(collectives: Sequence[Collective]) -> tuple[float, float]:
+    several = [found for found in collectives if found.ranks > 1]
+    if not several:
+        return MEASURED.latency, MEASURED.bandwidth
+    depth = np.array([math.ceil(math.log2(found.ranks)) for found in several], dtype=float)
+    volume = np.array([found.gathered_bytes * (found.ranks - 1) / found.ranks for found in several])
+    seconds = np.array([found.seconds for found in several])
+    terms = np.stack([depth, volume], axis=1) / seconds[:, None]
+    latency, each_byte = nnls(terms, np.ones_like(seconds))[0]
+    return float(latency), 1 / float(max(each_byte, 1e-15))
+
+
+def predictions(model: ScalingModel) -> list[Prediction]:
+    """Efficiencies at 10 to 10,000 ranks."""
+    return [
+        Prediction(vesicles=vesicles, ranks=ranks, efficiency=model.efficiency(POINTS * vesicles, ranks))
+        for vesicles in _VESICLES[1:]
+        for ranks in _RANKS
+    ]
+
+
+def recommendations(model: ScalingModel) -> list[Recommendation]:
+    """How many ranks scenes of different sizes are worth."""
+    return [
+        Recommendation(vesicles=vesicles, ranks=model.recommended_ranks(POINTS * vesicles, _RANKS[-1]))
+        for vesicles in _VESICLES
+    ]
+
+
+def crossover() -> Crossover:
+    """Where a fast multipole method begins to pay; `ASSUMPTION` says of what cost."""
+    in_a_box = math.sqrt(3) * _TERMS
+    pairs = _SUMS * (9 * in_a_box + 27 * _TERMS**2 / in_a_box)
+    return Crossover(
+        terms=_TERMS,
+        pairs_a_point=pairs,
+        points=math.ceil(pairs),
+        vesicles=math.ceil(pairs / POINTS),
+        assumption=ASSUMPTION,
+    )
+
+
+def with_fast_summation(model: ScalingModel, vesicles: int) -> float:
+    """Seconds of an evaluation on one rank whose sums are made by a fast multipole method."""
+    points = POINTS * vesicles
+    return model.pair * points * crossover().pairs_a_point + model.point * points + model.fixed
