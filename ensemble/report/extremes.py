@@ -151,8 +151,8 @@ GROUPS: Mapping[str, Mapping[str, Scene]] = MappingProxyType(
             "bending modulus 0.0001, one vesicle, shear": _scene(Vesicle(bending_modulus=1e-4), flow=_SHEAR),
         },
         "viscosity contrast": {
-            "contrast 10, shear": _pair(viscosity_contrast=10.0, flow=_SHEAR),
             "contrast 1000, one vesicle, shear": _scene(Vesicle(viscosity_contrast=1e3), flow=_SHEAR),
+            "contrast 10, shear": _pair(viscosity_contrast=10.0, flow=_SHEAR),
             "contrast 0.01, shear": _pair(viscosity_contrast=1e-2, flow=_SHEAR),
             "contrast 1000, at rest": _pair(viscosity_contrast=1e3),
             "contrasts 0.01 and 1000, shear": _unequal(

@@ -37,8 +37,8 @@ def powers_of(geometry: Geometry, vesicles: slice) -> Powers:
 
 
 @compiled
-def orders_between(points: Array, centers: Array, first: int, accuracy: float, out: Orders) -> None:
-    """Write how many terms the vesicles from ``first`` on need of each vesicle's series, (rows, M).
+def orders_between(points: Array, centers: Array, accuracy: float, out: Orders) -> None:
+    """Write how many terms each vesicle needs of each other's series, (M, M).
 
     Zero where they do not serve.
     """
@@ -48,8 +48,7 @@ def orders_between(points: Array, centers: Array, first: int, accuracy: float, o
         dx = points[0, source] - centers[0, source]
         dy = points[1, source] - centers[1, source]
         radii[source] = np.sqrt(np.max(dx * dx + dy * dy))
-    for row in range(out.shape[0]):
-        target = first + row
+    for target in range(out.shape[0]):
         for source in range(radii.size):
             nearest = np.inf
             for i in range(points.shape[2]):
@@ -58,7 +57,7 @@ def orders_between(points: Array, centers: Array, first: int, accuracy: float, o
                 nearest = min(nearest, dx * dx + dy * dy)
             decay = 0.5 * np.log(nearest) - np.log(radii[source])
             serves = source != target and decay * LARGEST_ORDER >= needed
-            out[row, source] = max(2, int(np.ceil(needed / decay))) if serves else 0
+            out[target, source] = max(2, int(np.ceil(needed / decay))) if serves else 0
 
 
 def coefficients_of(powers: Powers, point_forces: Array) -> Array:

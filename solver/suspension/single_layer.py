@@ -27,7 +27,7 @@ from solver.suspension.multipoles import velocity as summed_velocity
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-_FAR_COST = 6.0  # of a far vesicle to one target, in Stokeslets; measured
+_SERIES_COST = 3.0  # of a series to one target beyond its terms, in Stokeslets
 
 
 @compiled
@@ -131,17 +131,19 @@ class SummedSingleLayer:
         membranes = geometry.membranes
         count, points = membranes.count, membranes.points
         refinement = neighbors.refinement(self.ratio)
+        orders = np.empty((count, count), dtype=np.int64)
+        orders_between(geometry.points, geometry.centers, self._accuracy, orders)
 
         def costs() -> Array:
             near = row_costs(refinement, count * points).reshape(count, points).sum(axis=1)
-            return near + points * (points + _FAR_COST * count)
+            each = np.where(orders > 0, _SERIES_COST + orders, points)
+            return near + points * each.sum(axis=1)
 
         self.shares = self._parallel.divide(count, costs)
         own = self.shares.own
         self._geometry = geometry
         self._powers = powers_of(geometry, own)
-        self._orders = np.empty((own.stop - own.start, count), dtype=np.int64)
-        orders_between(geometry.points, geometry.centers, own.start, self._accuracy, self._orders)
+        self._orders = orders[own]
         refinement = within(refinement, slice(own.start * points, own.stop * points), count * points)
         group = np.repeat(np.arange(len(refinement.groups)), np.diff(refinement.starts))
         self._sources = refinement.groups[group, 1]
