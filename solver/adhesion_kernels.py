@@ -12,7 +12,7 @@ Array = NDArray[np.float64]
 
 
 @compiled(inline="always")
-def _row(
+def potential_row(
     x: float,
     y: float,
     sources: Array,
@@ -58,7 +58,7 @@ def adhesion_force(
     dx, dy, inverse, high, low = np.empty((5, sources.shape[1]))
     for i in range(targets.shape[1]):
         square = distance * distance
-        _row(targets[0, i], targets[1, i], sources, square, m, n, dx, dy, inverse, high, low)
+        potential_row(targets[0, i], targets[1, i], sources, square, m, n, dx, dy, inverse, high, low)
         fx = 0.0
         fy = 0.0
         for j in range(sources.shape[1]):
@@ -77,7 +77,7 @@ def adhesion_energy(targets: Array, sources: Array, distance: float, m: int, n: 
     total = 0.0
     for i in range(targets.shape[1]):
         square = distance * distance
-        _row(targets[0, i], targets[1, i], sources, square, m, n, dx, dy, inverse, high, low)
+        potential_row(targets[0, i], targets[1, i], sources, square, m, n, dx, dy, inverse, high, low)
         for j in range(sources.shape[1]):
             total += high[j] - ratio * low[j]
     return total
@@ -99,7 +99,7 @@ def adhesion_hessian(
     dx, dy, inverse, high, low = np.empty((5, sources.shape[1]))
     for i in range(targets.shape[1]):
         square = distance * distance
-        _row(targets[0, i], targets[1, i], sources, square, m, n, dx, dy, inverse, high, low)
+        potential_row(targets[0, i], targets[1, i], sources, square, m, n, dx, dy, inverse, high, low)
         for j in range(sources.shape[1]):
             strength = scale * inverse[j] * (high[j] - low[j])
             radial = -scale * inverse[j] * inverse[j] * ((m + 2) * high[j] - (n + 2) * low[j])

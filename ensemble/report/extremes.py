@@ -64,6 +64,8 @@ def _pair(
     reduced_area: float = 0.9,
     bending_modulus: float = 1.0,
     shift: float = 0.2,
+    viscosity_contrast: float = 1.0,
+    cutoff: float | None = None,
     **rest: Any,
 ) -> Scene:
     """Two upright vesicles side by side, ``gap`` apart and a little shifted against each other."""
@@ -72,11 +74,12 @@ def _pair(
         Vesicle(
             reduced_area=reduced_area,
             bending_modulus=bending_modulus,
+            viscosity_contrast=viscosity_contrast,
             center=(side * (half_width + gap / 2), side * shift / 2),
         )
         for side in (-1, 1)
     )
-    adhesion = Adhesion(hamaker=hamaker, distance=distance, exponents=exponents)
+    adhesion = Adhesion(hamaker=hamaker, distance=distance, exponents=exponents, cutoff=cutoff)
     return _scene(*vesicles, adhesion=adhesion, **rest)
 
 
@@ -146,6 +149,19 @@ GROUPS: Mapping[str, Mapping[str, Scene]] = MappingProxyType(
             "bending modulus 100, shear": _pair(bending_modulus=1e2, flow=_SHEAR),
             "bending modulus 100, at rest": _pair(bending_modulus=1e2),
             "bending modulus 0.0001, one vesicle, shear": _scene(Vesicle(bending_modulus=1e-4), flow=_SHEAR),
+        },
+        "viscosity contrast": {
+            "contrast 1000, one vesicle, shear": _scene(Vesicle(viscosity_contrast=1e3), flow=_SHEAR),
+            "contrast 10, shear": _pair(viscosity_contrast=10.0, flow=_SHEAR),
+            "contrast 0.01, shear": _pair(viscosity_contrast=1e-2, flow=_SHEAR),
+            "contrast 1000, at rest": _pair(viscosity_contrast=1e3),
+            "contrasts 0.01 and 1000, shear": _unequal(
+                {"viscosity_contrast": 1e-2}, {"viscosity_contrast": 1e3}, flow=_SHEAR
+            ),
+        },
+        "cutoff": {
+            "cutoff 1.5, shear": _pair(cutoff=1.5, flow=_SHEAR),
+            "cutoff 0.5, distance 0.4, at rest": _pair(gap=0.45, cutoff=0.5),
         },
         "flow rate": {
             "shear rate 10": _pair(flow=Shear(rate=10.0), horizon=10.0),

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver import scene
-from solver.adhesion_kernels import adhesion_energy, adhesion_force, adhesion_hessian
+from solver.adhesion_kernels import adhesion_energy, adhesion_force, adhesion_hessian, potential_row
 from solver.compilation import compiled
 from solver.geometry import Geometry
 from solver.parallel import Parallel, Shares
@@ -21,6 +21,37 @@ from solver.quadrature import required_ratio, trapezoid_error
 from solver.refinement import MAXIMUM_FACTOR, Refinement, refined_points, sum_costs, within
 
 Array = NDArray[np.float64]
+
+_FEWEST = 16  # points that a vesicle is seen by
+_CHUNK = 256  # sources of which all terms stay in the first cache
+
+
+@compiled
+def _gather_sources(
+    points: Array, spacing: Array, centers: Array, radii: Array, target: int, needed: float, sources: Array
+) -> int:
+    """Write points and spacings (3, ·) by which a vesicle sees the others; return how many these are.
+
+    Far away every second point serves, farther still every fourth, and so on.  The sum over n points of a
+    circle of radius R errs by (1 + d/R)^−n at the distance d; ``needed`` is how many e-folds that shall be.
+    """
+    count, n = points.shape[1], points.shape[2]
+    used = 0
+    for source in range(count):
+        if source == target:
+            continue
+        dx, dy = centers[0, source] - centers[0, target], centers[1, source] - centers[1, target]
+        apart = np.sqrt(dx * dx + dy * dy) - radii[source] - radii[target]
+        decay = np.log1p(max(apart, 0.0) / radii[source])
+        step = 1
+        while n % (2 * step) == 0 and n >= _FEWEST * 2 * step and n * decay >= needed * 2 * step:
+            step *= 2
+        for i in range(0, n, step):
+            sources[0, used] = points[0, source, i]
+            sources[1, used] = points[1, source, i]
+            sources[2, used] = spacing[source] * step
+            used += 1
+    return used
 
 
 @compiled
@@ -31,6 +62,8 @@ def _add_forces(
     distance: float,
     m: int,
     n: int,
+    centers: Array,
+    needed: float,
     strength: float,
     first: int,
     density: Array,
@@ -38,15 +71,28 @@ def _add_forces(
     """Add the adhesion force per length to ``density`` (2, rows), which begins with the point ``first``."""
     count, size = points.shape[1], points.shape[2]
     last = first + density.shape[1]
+    radii = np.empty(count)
+    for vesicle in range(count):
+        dx, dy = points[0, vesicle] - centers[0, vesicle], points[1, vesicle] - centers[1, vesicle]
+        radii[vesicle] = np.sqrt(np.max(dx * dx + dy * dy))
+    sources = np.empty((3, count * size))
     for target in range(first // size, (last + size - 1) // size):
-        begin, end = max(first, target * size), min(last, (target + 1) * size)
-        targets = np.ascontiguousarray(points[:, target, begin - target * size : end - target * size])
-        force = np.empty((2, end - begin))
-        for source in range(count):
-            if source != target:
-                scale = strength * spacing[source]
-                adhesion_force(targets, points[:, source], distance, m, n, scale, force)
-                density[:, begin - first : end - first] += force
+        used = _gather_sources(points, spacing, centers, radii, target, needed, sources)
+        for begin in range(0, used, _CHUNK):
+            seen = np.ascontiguousarray(sources[:, begin : min(begin + _CHUNK, used)])
+            weights = seen[2]
+            dx, dy, inverse, high, low = np.empty((5, weights.size))
+            for point in range(max(first, target * size), min(last, (target + 1) * size)):
+                x, y = points[0, target, point - target * size], points[1, target, point - target * size]
+                potential_row(x, y, seen, distance * distance, m, n, dx, dy, inverse, high, low)
+                force_x = 0.0
+                force_y = 0.0
+                for j in range(weights.size):
+                    pull = weights[j] * inverse[j] * (high[j] - low[j])
+                    force_x += dx[j] * pull
+                    force_y += dy[j] * pull
+                density[0, point - first] += strength * force_x
+                density[1, point - first] += strength * force_y
     for g in range(refinement.groups.shape[0]):
         target, source, factor = refinement.groups[g]
         rows = refinement.rows[refinement.starts[g] : refinement.starts[g + 1]]
@@ -156,6 +202,7 @@ class SummedAdhesion:
         self._potential = parameters.distance, m, n
         self._hamaker = parameters.hamaker
         self._order = 0.5 * m + 1
+        self._needed = -2 * float(np.log(accuracy))  # twice, as vesicles are no circles; measured
         self.ratio = required_ratio(self._order, accuracy)
 
     def density(self, geometry: Geometry, neighbors: Proximity) -> Array:
@@ -163,7 +210,8 @@ class SummedAdhesion:
         shares, arguments = self._share(geometry, neighbors)
         own = shares.own
         density = np.zeros((2, own.stop - own.start))
-        _add_forces(*arguments, self._hamaker * self._potential[1], own.start, density)
+        strength = self._hamaker * self._potential[1]
+        _add_forces(*arguments, geometry.centers, self._needed, strength, own.start, density)
         return shares.gather(density, axis=1).reshape(geometry.points.shape)
 
     def stiffness(self, geometry: Geometry, neighbors: Proximity) -> Array:

@@ -81,7 +81,7 @@ class Suspension:
             self.layer,
             geometry,
             self._preconditioner,
-            density * self.membranes.spacing[:, None],
+            density,
             self.flow.velocity(geometry) if self.flow else None,
         )
         self._last = Motion(geometry, neighbors, free.velocity, free.turning, free.tension, bending, adhesion)
@@ -125,21 +125,22 @@ class Suspension:
             carried = alone.flow.jacobian(by_state) if alone.flow else None
             blocks[k] = alone.linearized(among_others, drawn, carried)
             inverses[k], shifts[k] = alone.inextensibility.inverse, alone.inextensibility.shift
-        self._preconditioner = Preconditioner(shares.gather(inverses), shares.gather(shifts))
+        self._preconditioner = Preconditioner(shares.gather(inverses), shares.gather(shifts)[:, None])
         angles = np.arange(count * points).reshape(count, points)
         centers = count * points + np.arange(2 * count).reshape(2, count).T
         return BlockDiagonal(shares.gather(blocks), np.concatenate([angles, centers], axis=1))
 
     def _precondition(self, geometry: Geometry) -> Preconditioner:
+        """A preconditioner for the tension before there is a Jacobian."""
         count, points = self.membranes.count, self.membranes.points
         shares = self.parallel.divide(count)
         own = range(count)[shares.own]
         inverses, shifts = np.empty((len(own), points, points)), np.empty(len(own))
         for k, vesicle in enumerate(own):
-            alone, _ = self._alone(geometry, vesicle)
-            alone.inextensibility.factorize(alone.layer, _)
+            alone, its_geometry = self._alone(geometry, vesicle)
+            alone.inextensibility.factorize(alone.layer, its_geometry)
             inverses[k], shifts[k] = alone.inextensibility.inverse, alone.inextensibility.shift
-        return Preconditioner(shares.gather(inverses), shares.gather(shifts))
+        return Preconditioner(shares.gather(inverses), shares.gather(shifts)[:, None])
 
     def _alone(self, geometry: Geometry, vesicle: int) -> tuple[Dynamics, Geometry]:
         """A vesicle as if it were alone in the flow, its single layer assembled."""

@@ -5,6 +5,8 @@ The preconditioner is each vesicle's own inverse.  The iteration begins with the
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,24 +20,17 @@ Array = NDArray[np.float64]
 _LIMIT = 100  # iterations; measured: 4 to 8 are usual
 
 
-class Preconditioner:
+class Preconditioner(NamedTuple):
     """What each vesicle's tension does to itself.
 
-    Parameters
-    ----------
     inverses : (M, N, N)
         `Inextensibility.inverse` of each vesicle alone.
-    shifts : (M,)
+    shifts : (M, 1)
         What times the mean tension is added on each, `Inextensibility.shift`.
     """
 
-    def __init__(self, inverses: Array, shifts: Array) -> None:
-        self._inverses = inverses
-        self.shifts = shifts[:, None]
-
-    def __call__(self, residual: Array) -> Array:
-        """Tensions (M, N) that would remove this residual (M, N) if each vesicle were alone."""
-        return np.asarray((self._inverses @ residual[:, :, None])[:, :, 0])
+    inverses: Array
+    shifts: Array
 
 
 class SummedInextensibility:
@@ -58,52 +53,70 @@ class SummedInextensibility:
         layer: SummedSingleLayer,
         geometry: Geometry,
         preconditioner: Preconditioner,
-        point_forces: Array,
+        density: Array,
         flow: Array | None,
     ) -> Inextensible:
-        """The motion under point forces without tension, (2, M, N), in a flow of velocity (2, M, N).
+        """The motion under a force density without tension, (2, M, N), in a flow of velocity (2, M, N).
+
+        Each rank iterates on its share of the vesicles; sums over all of them are made in the same order on
+        every rank.
 
         Raises
         ------
         TensionNotFoundError
             If the iteration does not converge.
         """
-        membranes = geometry.membranes
-        tangents, shifts = geometry.tangents, preconditioner.shifts
+        membranes, shares = geometry.membranes, layer.shares
+        own = shares.own
+        tangents, spacing = geometry.tangents[:, own], membranes.spacing[own, None]
+        inverses, shifts = preconditioner.inverses[own], preconditioner.shifts[own]
         derivative = (2 * np.pi / membranes.points) * differentiation(membranes.points).T  # spacing · ∂/∂s
-
-        def stretching(velocity: Array) -> Array:
-            gradient = velocity @ derivative
-            return np.asarray(tangents[0] * gradient[0] + tangents[1] * gradient[1])
 
         def pull(tension: Array) -> Array:
             return np.asarray((tension * tangents) @ derivative)
 
-        tension = np.zeros(tangents.shape[1:]) if self._last is None else self._last.copy()
-        velocity = layer.velocity(point_forces + pull(tension))
+        def along(vectors: Array) -> Array:
+            return np.asarray(tangents[0] * vectors[0] + tangents[1] * vectors[1])
+
+        def precondition(residual: Array) -> Array:
+            return np.asarray((inverses @ residual[:, :, None])[:, :, 0])
+
+        def total(*fields: Array) -> Array:
+            """Sums of fields (m, N) over all points of all vesicles."""
+            return shares.gather(np.stack([field.sum(axis=1) for field in fields], axis=1)).sum(axis=0)
+
+        tension = np.zeros(tangents.shape[1:]) if self._last is None else self._last[own].copy()
+        velocity = layer.velocity(density[:, own] * spacing + pull(tension))
         if flow is not None:
-            velocity += flow
-        residual = stretching(velocity) - shifts * tension.mean(axis=1, keepdims=True)
-        natural = membranes.natural_rate * np.sqrt(membranes.points * np.sum(membranes.spacing**2))
-        goal = self.tolerance * max(float(np.linalg.norm(velocity @ derivative)), float(natural))
-        direction = preconditioner(residual)
-        product = np.sum(residual * direction)
+            velocity += flow[:, own]
+        gradient = velocity @ derivative
+        residual = along(gradient) - shifts * tension.mean(axis=1, keepdims=True)
+        direction = precondition(residual)
+        strain, square, product = total(
+            np.sum(gradient * gradient, axis=0), residual * residual, residual * direction
+        )
+        natural = membranes.natural_rate**2 * membranes.points * np.sum(membranes.spacing**2)
+        goal = self.tolerance**2 * max(strain, natural)
         for _ in range(_LIMIT):
-            if np.linalg.norm(residual) <= goal:
+            if square <= goal:
                 break
             self.iterations += 1
             change = layer.velocity(pull(direction))
-            image = shifts * direction.mean(axis=1, keepdims=True) - stretching(change)
-            step = product / np.sum(direction * image)
+            image = shifts * direction.mean(axis=1, keepdims=True) - along(change @ derivative)
+            step = product / total(direction * image)[0]
             tension += step * direction
             velocity += step * change
             residual -= step * image
-            correction = preconditioner(residual)
-            previous, product = product, np.sum(residual * correction)
+            correction = precondition(residual)
+            previous = product
+            square, product = total(residual * residual, residual * correction)
             direction = correction + (product / previous) * direction
         else:
             raise TensionNotFoundError("the tension could not be found: the membranes are too distorted")
+        found = np.concatenate([velocity, tension[None]])
+        velocity_x, velocity_y, tension = shares.gather(found, axis=1)
         self._last = tension
-        gradient = membranes.wavenumber * (velocity @ differentiation(membranes.points).T)
-        turning = tangents[0] * gradient[1] - tangents[1] * gradient[0]
-        return Inextensible(tension.copy(), velocity, turning)
+        velocity = np.stack([velocity_x, velocity_y])
+        gradient = geometry.arclength_derivative(velocity)
+        turning = geometry.tangents[0] * gradient[1] - geometry.tangents[1] * gradient[0]
+        return Inextensible(tension, velocity, turning)

@@ -143,16 +143,19 @@ def test_both_published_kinds_of_vesicles_are_what_they_say() -> None:
     assert published_run.case.scene.vesicles[0].length == pytest.approx(0.99755 * 2 * math.pi, rel=1e-6)
     scene = published_run.until_published_horizon.scene
     assert (scene.horizon, scene.criteria.extensions) == (100.0, 1.0)
-    assert scene.criteria.revolutions == 100
+    assert scene.criteria.revolutions > scene.horizon
 
 
 def test_what_is_seen_at_the_end_is_how_far_apart_a_pair_is_and_whither_it_goes() -> None:
-    run = replace(orbit(), outcome=Outcome.UNDECIDED)
-    distance = np.linspace(3.0, 10.0, 41)
-    leaving = replace(run, series=dict(run.series) | {"center_distance": distance})
-    distance = np.append(distance[1:], 9.9)
-    returning = replace(run, series=dict(run.series) | {"center_distance": distance})
+    run = replace(orbit(), outcome=Outcome.UNDECIDED)  # its line of centers turns by 8 radians
+    half_turn = np.linspace(0, -np.pi, 41)
+    growing = np.linspace(3.0, 10.0, 41)
+    leaving = replace(run, series=dict(run.series) | {"center_distance": growing, "center_angle": half_turn})
+    sliding = replace(run, series=dict(run.series) | {"center_distance": growing})
+    turned_back = np.append(growing[1:], 9.9)
+    returning = replace(leaving, series=dict(leaving.series) | {"center_distance": turned_back})
     assert critical_hamaker.seen_at_the_end(run) == "bound"
+    assert critical_hamaker.seen_at_the_end(sliding) == "bound"
     assert critical_hamaker.seen_at_the_end(leaving) == "separated"
     assert critical_hamaker.seen_at_the_end(returning) == "bound"
     assert critical_hamaker.seen_at_the_end(replace(run, outcome=Outcome.SEPARATED)) == "separated"

@@ -255,6 +255,8 @@ def test_the_extreme_scenes_reach_what_they_should():
     assert max(adhesion.hamaker for adhesion in adhesions) == 1e3
     assert {0.3, 0.999, 1.0} <= {vesicle.reduced_area for vesicle in vesicles}
     assert {1e-4, 1e2} <= {vesicle.bending_modulus for vesicle in vesicles}
+    assert {1e-2, 10.0, 1e3} <= {vesicle.viscosity_contrast for vesicle in vesicles}
+    assert any(adhesion.cutoff for adhesion in adhesions)
     assert {1e-3, 1e2} <= {scene.flow.rate for scene in scenes if scene.flow}
     assert {16, 512} <= {scene.numerics.points for scene in scenes}
     assert max(scene.horizon for scene in scenes) == 1e4

@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from solver import suspension as suspension_module
+from solver.adhesion import Adhesion as FewAdhesion
+from solver.direct_sum import velocity as direct_velocity
 from solver.dynamics import Dynamics
 from solver.equation import equation_of_motion
-from solver.geometry import Geometry
+from solver.geometry import Geometry, Membranes
 from solver.integrators.bdf import BackwardDifferentiation, BlockBackwardDifferentiation
 from solver.integrators.sdc import DeferredCorrection
 from solver.neighbors import Neighbors
@@ -22,7 +24,8 @@ from solver.refinement import LARGEST_REFINED
 from solver.scene import LARGEST_DENSE, Adhesion, Extension, Numerics, Scene, Shear, Trap, Vesicle
 from solver.simulate import simulate
 from solver.start import placed_state
-from solver.suspension import Suspension
+from solver.suspension import Suspension, multipoles
+from solver.suspension.adhesion import SummedAdhesion
 from tests.solver.steps import all_steps, fixed_steps
 from tests.solver.suspensions import suspension
 
@@ -68,7 +71,9 @@ def test_sums_and_matrices_give_the_same_motion(fields: dict[str, Any]) -> None:
         np.testing.assert_allclose(here, there, rtol=0, atol=1e-9 * np.max(np.abs(there)), err_msg=name)
     if sums.adhesion:
         assert matrices.adhesion
-        np.testing.assert_allclose(found.adhesion, expected.adhesion, rtol=0, atol=1e-10)
+        assert expected.adhesion is not None
+        largest = np.max(np.abs(expected.adhesion))
+        np.testing.assert_allclose(found.adhesion, expected.adhesion, rtol=0, atol=1e-11 * largest)
         energy = matrices.adhesion.energy(expected.geometry, expected.closeness)
         assert sums.adhesion.energy(found.geometry, found.closeness) == pytest.approx(energy, rel=1e-11)
 
@@ -140,6 +145,38 @@ def test_blocks_contain_how_others_draw_a_vesicle() -> None:
     stiffness = sums.adhesion.stiffness(geometry, Neighbors(geometry, sums.reach))[:, 1]
     expected = (drawn(step) - drawn(-step)) / (2 * step)
     np.testing.assert_allclose(stiffness[:2], expected, rtol=0, atol=1e-6 * np.max(np.abs(expected)))
+
+
+def scattered(count: int, points: int) -> Geometry:
+    """A suspension, in which most vesicles are far from each other."""
+    scene = suspension(count, points)
+    return Geometry(Membranes.of_scene(scene), placed_state(scene))
+
+
+@pytest.mark.parametrize("accuracy", [1e-4, 1e-7, 1e-10])
+def test_series_give_the_sum_over_points_as_accurately_as_asked(accuracy: float) -> None:
+    geometry = scattered(25, 64)
+    forces = np.random.default_rng(0).standard_normal(geometry.points.shape)
+    flat = geometry.points.reshape(2, -1)
+    expected = direct_velocity(flat, flat, forces.reshape(2, -1)).reshape(forces.shape)
+    orders = np.empty((25, 25), dtype=np.int64)
+    multipoles.orders_between(geometry.points, geometry.centers, accuracy, orders)
+    coefficients = multipoles.coefficients_of(multipoles.powers_of(geometry, slice(0, 25)), forces)
+    found = np.empty_like(forces)
+    by_vesicle = np.ascontiguousarray(forces.swapaxes(0, 1))
+    multipoles.velocity(geometry.points, by_vesicle, geometry.centers, coefficients, orders, 0, found)
+    assert np.mean(orders > 0) > 0.5
+    assert np.all(np.diag(orders) == 0)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=accuracy * np.max(np.abs(expected)))
+
+
+def test_adhesion_between_far_vesicles_needs_few_of_their_points() -> None:
+    geometry = scattered(25, 64)
+    parameters = Adhesion(hamaker=1.0, distance=0.4)
+    near = Neighbors(geometry, 6.0)
+    found = SummedAdhesion(parameters, 1e-7, SERIAL).density(geometry, near)
+    expected = FewAdhesion(parameters, 1e-7).density(geometry, Closeness(geometry))
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6 * np.max(np.abs(expected)))
 
 
 # --- Neighbors --------------------------------------------------------------------------------------------

@@ -26,7 +26,7 @@ _PRESETS: Final = {0.4: "critical-hamaker", 0.1: "critical-hamaker-short-range"}
 _QUICK_RATES = (0.5, 1.0)
 _QUICK_TOLERANCE = 0.05
 _ALLOWED = 3.0  # percent, of published brackets
-_APART = 2.0  # times the distance at the start
+_COME_ROUND = 1.5 * math.pi  # of the line of centers
 
 
 class _Published(NamedTuple):
@@ -64,9 +64,9 @@ def _study(distance: float, quick: bool) -> StudyCase:
 
 
 def seen_at_the_end(run: Run) -> str:
-    """What one who looks at a run's end sees: separated if the pair is far apart and still moving apart."""
-    distance = run.series["center_distance"]
-    leaving = distance[-1] > _APART * distance[0] and distance[-1] > distance[-2]
+    """What a run's end looks like: separated if the pair moves apart and has not come round yet."""
+    distance, angle = run.series["center_distance"], run.series["center_angle"]
+    leaving = distance[-1] > distance[-2] and abs(angle[-1] - angle[0]) < _COME_ROUND
     return _FATES[0] if run.outcome is Outcome.SEPARATED or leaving else _FATES[1]
 
 
@@ -103,7 +103,7 @@ _INTRODUCTION = (
     "doublet near the boundary opens and closes slowly and may come round once and separate later, most of "
     "all at small δ, so a boundary decided by events (here) lies above one that is read at T = 100.  Below "
     "each comparison the ends of the published brackets are run at the published settings and read at "
-    "T = 100; these must agree."
+    "T = 100 (separated: moving apart and not come round yet); these must agree."
 )
 
 

@@ -102,7 +102,7 @@ def against_area(of_area: Mapping[float, Sequence[Energies]], best: Mapping[floa
         if best[strength] is not None:
             right.axvline(best[strength], color=color, linestyle=":", linewidth=0.9)
     right.set(xlabel=r"reduced area $\Delta A$", ylabel="total energy above its minimum", ylim=(0, 3))
-    right.legend()
+    right.legend(loc="upper center", frameon=True, facecolor="white", framealpha=1, edgecolor="none")
     return figure
 
 

@@ -63,7 +63,7 @@ def _doublet(reduced_area: float, hamaker: float = _HAMAKER, distance: float = _
 
 
 def _course(quick: bool) -> Course:
-    areas = _REDUCED_AREAS[3::2] if quick else _REDUCED_AREAS
+    areas = _REDUCED_AREAS[3:8] if quick else _REDUCED_AREAS
     strengths = (_HAMAKER,) if quick else _STRENGTHS
     distances, hamakers = (_DISTANCES[:1], _HAMAKERS[::2]) if quick else (_DISTANCES, _HAMAKERS)
     shapes = [_doublet(area) for area in _SHOWN]

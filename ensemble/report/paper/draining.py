@@ -9,7 +9,7 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullFormatter
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from ensemble.figures.style import BLUE, GRAY, GREEN, ORANGE, PURPLE, STYLE, VERMILLION, WIDTH
 from ensemble.report.paper.case import Case
@@ -180,7 +180,7 @@ def _energy_drawing(runs: Mapping[_Pair, Run], times: Mapping[_Pair, float], set
         axes.set(
             title=title, xlabel="time $t$", ylabel=r"$1 - E_{\mathrm{adh}}/E_{\mathrm{adh}}^{\mathrm{eq}}$"
         )
-        axes.set(xlim=(0, 1.25 * max((times[pair] for pair in made), default=1.0)), ylim=(-0.03, 1.03))
+        axes.set(xlim=(0, 1.25 * max((times[pair] for pair in made), default=1.0)), ylim=(-0.03, None))
         axes.legend(loc="upper right")
     return Drawing(
         f"energy-{setting.modulus:g}-{setting.separation:g}",
@@ -198,7 +198,7 @@ def _draw_energy(axes: Axes, run: Run, time: float, color: str, label: str) -> N
 
 @matplotlib.rc_context(STYLE)
 def _scaling_drawing(times: Mapping[_Pair, float], settings: tuple[_Setting, ...]) -> Drawing:
-    figure = Figure(figsize=(WIDTH, 3.0), layout="constrained")
+    figure = Figure(figsize=(WIDTH, 3.8), layout="constrained")
     left, right = figure.subplots(1, 2)
     values = published()["draining"]
     for axes, symbol, sign, by, varied, reference in (
@@ -219,8 +219,10 @@ def _scaling_drawing(times: Mapping[_Pair, float], settings: tuple[_Setting, ...
         ticks = _DISTANCES[::2] if sign == "δ" else (0.1, 0.2, 0.5)
         axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
         axes.xaxis.set_minor_formatter(NullFormatter())
+        axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        axes.yaxis.set_major_formatter("{x:g}")
         axes.yaxis.set_minor_formatter(NullFormatter())
-        axes.legend(loc="lower left")
+        axes.legend(loc="lower left", bbox_to_anchor=(0, 1), borderaxespad=0.2)
     return Drawing("scaling", "Draining times with fitted power laws; exponents with 95% confidence.", figure)
 
 

@@ -116,7 +116,7 @@ def _drawing(results: Results) -> Drawing:
         ):
             run = results.run(potential.in_(preset))
             axes.plot(run.series["time"], run.series["gap"], line, color=color, label=str(potential))
-            if run.outcome is not Outcome.SEPARATED:
+            if run.outcome in (Outcome.BOUND, Outcome.EQUILIBRIUM):
                 longest = max(longest, run.time)
         axes.set(title=_PRESETS[preset], xlabel="time $t$", ylabel="gap", ylim=(0, 1.6), xlim=(0, longest))
     axes.legend()

@@ -139,15 +139,14 @@ def _difference_row(runs: Mapping[_Meeting, Run], held: Mapping[_Meeting, Run]) 
 
 
 def _critical_rows(results: Results, study: StudyCase) -> list[Row]:
-    rows = []
+    rows, found = [], results.brackets(study)
     for displacement, point in results.points(study).items():
-        low, high = point.bracket
         known = _PUBLISHED_BRACKET if displacement == 0.1 else None
         rows.append(
             bracket(
                 f"Hamaker constant that holds the pair, Δy = {displacement:g}",
                 known,
-                None if low is None or high is None else (low, high),
+                found.get(displacement),
                 study,
                 allowed=None if known is None else 3,
                 runs=point.runs,
@@ -160,14 +159,13 @@ def _critical_rows(results: Results, study: StudyCase) -> list[Row]:
 def _explaining_rows(results: Results, by_area: StudyCase, as_published: Case) -> list[Row]:
     """Why a pair that is published as lost is not: the paper's step control, and from which area on it is."""
     (point,) = results.points(by_area).values()
-    low, high = point.bracket
     published, made = _MEETINGS[-1].published, _together(results.run(as_published))
     return [
         words("Δy = 0.1, H = 0.6 with the paper's step control", published, made, [as_published]),
         bracket(
             "reduced area from which Δy = 0.1, H = 0.6 is lost",
             None,
-            None if low is None or high is None else (low, high),
+            next(iter(results.brackets(by_area).values()), None),
             by_area,
             runs=point.runs,
             note="published: 0.75",

@@ -14,7 +14,6 @@ from ensemble.figures.membranes import membrane_segments
 from ensemble.figures.style import BLACK, STYLE, TENSION_COLORS, WIDTH
 from solver.run import Run
 
-_MARGIN = 0.25  # around the membranes, in the unit of length
 _QUANTILES = (0.02, 0.98)  # of the tensions after the start: an ellipse that has not relaxed exceeds them far
 
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from ensemble.report.paper import (
+    contrast,
     critical_hamaker,
     doublets,
     draining,
@@ -28,6 +29,7 @@ SECTIONS: Final[tuple[Section, ...]] = (
     viscosity.SECTION,
     exponents.SECTION,
     unequal.SECTION,
+    contrast.SECTION,
 )
 
 

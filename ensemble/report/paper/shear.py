@@ -19,7 +19,7 @@ from solver.run import Run
 
 _WEAK, _STRONG = 0.7, 2.1  # Hamaker constants of the published snapshots; their periods are nearly the same
 _SHOWN_TIMES = tuple(float(time) for time in range(0, 60, 6))
-_SLIDES = 1.3  # variation of the center distance in a turn from which on a doublet slides
+_SLIDES = 1.5  # variation of the center distance in a turn from which on a doublet slides
 _HAMAKERS = tuple(step / 10 for step in range(1, 11))  # of the distance curves
 _ALLOWED = 1.0  # percent, of published periods
 _ALLOWED_INDEPENDENT = 0.1

@@ -10,6 +10,8 @@ from ensemble.report.paper.results import Results
 
 RATE, DISTANCE = 0.5, 0.4  # unless they are varied
 
+_UNREACHED = 1000  # revolutions
+
 
 class Doublet(NamedTuple):
     """What is varied; the vesicles are those of the published runs, or have reduced area 0.9 exactly."""
@@ -29,7 +31,7 @@ class Doublet(NamedTuple):
         """Followed until the published runs end, however often it has turned."""
         horizon = published()["settings"]["horizon"]
         return self.case.but(
-            {"horizon": horizon, "criteria.extensions": 1.0, "criteria.revolutions": int(horizon)}
+            {"horizon": horizon, "criteria.extensions": 1.0, "criteria.revolutions": _UNREACHED}
         )
 
     @property

@@ -97,13 +97,14 @@ def _first_rows(results: Results, study: StudyCase, actual: StudyCase) -> list[R
     """The loss of the side-by-side pair, also at the reduced areas and lengths of the published runs."""
     known = {area: (low, high) for area, low, high in published()["trap"]["critical_extension_rate"]}
     really = results.points(actual)
+    found, really_found = results.brackets(study), results.brackets(actual)
     rows = []
     for area, point in results.points(study).items():
         rows.append(
             bracket(
                 f"rate that ends side by side, ΔA = {area:g}",
                 known.get(area),
-                _known(point.bracket),
+                found.get(area),
                 study,
                 allowed=_ALLOWED if area in known else None,
                 runs=point.runs,
@@ -116,7 +117,7 @@ def _first_rows(results: Results, study: StudyCase, actual: StudyCase) -> list[R
                 bracket(
                     f"the same, ΔA = {_ACTUAL[area]:g}, length 0.99755·2π, as published runs had",
                     known.get(area),
-                    _known(then.bracket),
+                    really_found.get(_ACTUAL[area]),
                     actual,
                     allowed=_ALLOWED,
                     runs=then.runs,
@@ -127,22 +128,18 @@ def _first_rows(results: Results, study: StudyCase, actual: StudyCase) -> list[R
 
 
 def _second_rows(results: Results, study: StudyCase) -> list[Row]:
+    found = results.brackets(study)
     return [
         bracket(
             f"rate that separates, ΔA = {area:g}",
             None,
-            _known(point.bracket),
+            found.get(area),
             study,
             runs=point.runs,
             note=_outcomes(point.outcomes),
         )
         for area, point in results.points(study).items()
     ]
-
-
-def _known(ends: Sequence[float | None]) -> tuple[float, float] | None:
-    low, high = ends
-    return None if low is None or high is None else (low, high)
 
 
 def _outcomes(ends: Sequence[str | None]) -> str:
@@ -164,8 +161,9 @@ _ANGLE_CAPTION = (
 )
 _ANGLE_TEXT = (
     "The paper gives final angles in a figure only.  Deflated pairs turn to 90° at low rates, as "
-    "published.  Rounder ones stay at 180°: their line of centers is the longest axis of the pair, which "
-    "the flow aligns with its diverging axis; for them 180° is the stable configuration."
+    "published.  The roundest ones (reduced area 0.9 and more, low rates) return to 180°: their line of "
+    "centers is the longest axis of the pair, which the flow aligns with its diverging axis.  At reduced "
+    "area 0.85 and rate 0.01 the pair turns too slowly to be told from one at rest."
 )
 _DIAGRAM_TEXT = (
     "The published critical rate is where the side-by-side doublet is lost.  Past the paper: beyond it "

@@ -101,7 +101,8 @@ def _area_rows(results: Results, study: StudyCase) -> list[Row]:
 
 def _trend_row(results: Results, study: StudyCase) -> Row:
     steps = np.diff([low for low, _ in results.brackets(study).values()])
-    trend = "falls" if np.all(steps > 0) else "rises" if np.all(steps < 0) else "is not monotone"
+    rises, falls = np.any(steps < 0), np.any(steps > 0)
+    trend = "is not monotone" if rises and falls else "rises" if rises else "falls" if falls else "is level"
     return words("H_c as the reduced area falls", "falls", trend, study)
 
 

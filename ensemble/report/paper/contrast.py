@@ -1,0 +1,105 @@
+"""Past the paper: vesicles whose fluid is more viscous than that around them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, Final
+
+import matplotlib
+import numpy as np
+from matplotlib.figure import Figure
+
+from ensemble.figures.style import BLACK, GRAY, STYLE, WIDTH
+from ensemble.figures.symbols import quantity
+from ensemble.report.paper.boundary_figures import draw_brackets
+from ensemble.report.paper.case import StudyCase
+from ensemble.report.paper.comparison import Bracket, Row, bracket, number
+from ensemble.report.paper.results import Results
+from ensemble.report.paper.section import Chapter, Course, Drawing, Plan, Section
+from solver.shapes import semi_axes
+
+_CONTRAST: Final = quantity("vesicles.viscosity_contrast", "shear")
+_AREA: Final = quantity("vesicles.reduced_area", "shear")
+_HAMAKER: Final = quantity("adhesion.hamaker", "shear")
+_QUICK_TREADING: Final[dict[str, Any]] = {"sweep.values": [0.75, 0.9], "search.tolerance": 0.1}
+_QUICK_ADHESION: Final[dict[str, Any]] = {"sweep.values": [1.0, 4.0], "search.tolerance": 0.1}
+
+
+def keller_skalak(reduced_area: float) -> float:
+    """Contrast beyond which an ellipse tumbles (J. Fluid Mech. 120, 27, 1982, in two dimensions).
+
+    The inclination obeys φ' = rate·(−½ + ½ f₀ [f₁ + 1/(f₁ (1 + f₂ (λ − 1)))] cos 2φ) with f₀ = 2ab/(a² + b²),
+    f₁ = ½(a/b − b/a), f₂ = (a² + b²)/(a + b)², and is steady as long as the factor of cos 2φ is at least ½.
+    """
+    a, b = semi_axes(reduced_area, 2 * math.pi)
+    f0, f1, f2 = 2 * a * b / (a**2 + b**2), (a / b - b / a) / 2, (a**2 + b**2) / (a + b) ** 2
+    return float(1 + (1 / (f1 * (1 / f0 - f1)) - 1) / f2)
+
+
+def _course(quick: bool) -> Course:
+    treading = StudyCase.of("critical-viscosity-contrast", _QUICK_TREADING if quick else {})
+    adhesion = StudyCase.of("critical-hamaker-contrast", _QUICK_ADHESION if quick else {})
+    results = yield Plan([], [treading, adhesion])
+    drawing = _figure(results.brackets(treading), results.brackets(adhesion))
+    return Chapter(
+        [
+            "With a fluid inside that is more viscous than the one outside, a single vesicle ceases to tread "
+            "around a steady shape and tumbles.  The theory of Keller and Skalak, in two dimensions, takes "
+            "it for an ellipse with a linear velocity on it; shapes that bending and flow choose freely, "
+            "and a velocity that does not stretch the membrane anywhere, tread up to somewhat larger "
+            "contrasts.  The more viscous the vesicles of a doublet, the less adhesion it needs: like rigid "
+            "bodies on one streamline they pass round each other on closed paths.",
+            Drawing(
+                "contrast",
+                "Left: contrast beyond which a vesicle tumbles, shear rate 1; gray: Keller and Skalak's "
+                "theory.  Right: critical Hamaker constant against contrast, shear rate 0.5, δ = 0.4.",
+                drawing,
+                f"{treading.command}; {adhesion.command}",
+            ),
+            _treading_rows(results, treading),
+            _adhesion_rows(results, adhesion),
+        ]
+    )
+
+
+def _treading_rows(results: Results, study: StudyCase) -> list[Row]:
+    brackets = results.brackets(study)
+    return [
+        number(
+            f"critical contrast, reduced area {area:g} (published: Keller and Skalak)",
+            keller_skalak(area),
+            math.sqrt(math.prod(brackets[area])) if area in brackets else None,
+            study,
+            runs=point.runs,
+            note=point.status,
+        )
+        for area, point in sorted(results.points(study).items())
+    ]
+
+
+def _adhesion_rows(results: Results, study: StudyCase) -> list[Row]:
+    brackets = results.brackets(study)
+    return [
+        bracket(f"H_c, contrast {at:g}", None, brackets.get(at), study, runs=point.runs, note=point.status)
+        for at, point in sorted(results.points(study).items())
+    ]
+
+
+@matplotlib.rc_context(STYLE)
+def _figure(treading: Mapping[float, Bracket], adhesion: Mapping[float, Bracket]) -> Figure:
+    figure = Figure(figsize=(WIDTH, 3.0), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    areas = np.linspace(0.55, 0.97, 100)
+    left.plot(areas, [keller_skalak(area) for area in areas], color=GRAY, label="Keller and Skalak")
+    left.set(xlabel=_AREA.label, ylabel=_CONTRAST.label, ylim=(1, None))
+    left.text(0.62, 5.5, "tumbling")
+    left.text(0.75, 1.8, "tank-treading")
+    draw_brackets(left, treading, BLACK, "bracket")
+    left.legend(loc="upper left")
+    right.set(xlabel=_CONTRAST.label, ylabel=_HAMAKER.label, xlim=(0, None))
+    draw_brackets(right, adhesion, BLACK, "bracket")
+    return figure
+
+
+SECTION = Section("contrast", "Past the paper: viscosity contrast", _course)

@@ -1,0 +1,169 @@
+"""What a vesicle's point forces cause far from it, by the powers of the distance.
+
+In complex numbers, with z from the vesicle's center to the target and t to a source, point forces f cause
+
+    4π u = Σ [−log|z − t| f + ½ f + ½ (z − t)/(z̄ − t̄) f̄].
+
+Expanded in t/z that becomes three power series in w = 1/z̄, whose coefficients are the moments Σ f tᵏ, Σ f t̄ᵏ
+and Σ t f̄ t̄ᵏ (Greengard, Kropinski & Mayo, J. Comput. Phys. 125, 1996).  Cut off after p terms they err by
+(largest |t|/|z|)^p.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.compilation import compiled
+from solver.direct_sum import velocity as direct_velocity
+from solver.geometry import Geometry
+from solver.logarithm import logarithm
+
+Array = NDArray[np.float64]
+Orders = NDArray[np.int64]
+Powers = NDArray[np.complex128]
+
+# Terms up to which the series serve; measured: one costs about as much as the sum over one point.
+LARGEST_ORDER = 32
+
+
+def powers_of(geometry: Geometry, vesicles: slice) -> Powers:
+    """The tᵏ of some vesicles, (m, p, N)."""
+    x, y = geometry.points[:, vesicles] - geometry.centers[:, vesicles, None]
+    powers = np.empty((x.shape[0], LARGEST_ORDER, x.shape[1]), dtype=complex)
+    powers[:, 0] = 1.0
+    powers[:, 1:] = (x + 1j * y)[:, None]
+    return np.multiply.accumulate(powers, axis=1, out=powers)
+
+
+@compiled
+def orders_between(points: Array, centers: Array, accuracy: float, out: Orders) -> None:
+    """Write how many terms each vesicle needs of each other's series, (M, M).
+
+    Zero where they do not serve.
+    """
+    needed = -np.log(accuracy)
+    radii = np.empty(points.shape[1])
+    for source in range(radii.size):
+        dx = points[0, source] - centers[0, source]
+        dy = points[1, source] - centers[1, source]
+        radii[source] = np.sqrt(np.max(dx * dx + dy * dy))
+    for target in range(out.shape[0]):
+        for source in range(radii.size):
+            nearest = np.inf
+            for i in range(points.shape[2]):
+                dx = points[0, target, i] - centers[0, source]
+                dy = points[1, target, i] - centers[1, source]
+                nearest = min(nearest, dx * dx + dy * dy)
+            decay = 0.5 * np.log(nearest) - np.log(radii[source])
+            serves = source != target and decay * LARGEST_ORDER >= needed
+            out[target, source] = max(2, int(np.ceil(needed / decay))) if serves else 0
+
+
+def coefficients_of(powers: Powers, point_forces: Array) -> Array:
+    """Coefficients (m, 6, p + 1) of the three series, real and imaginary, for point forces (2, m, N).
+
+    In order: of the series whose conjugate counts, of that which counts as it is, of that which counts times
+    z.  The first one's coefficient of w⁰ is the whole force instead.
+    """
+    force = point_forces[0] + 1j * point_forces[1]
+    t = powers[:, 1]
+    moments = powers @ np.stack([force, force.conj(), t.conj() * force], axis=-1)
+    along, opposite, turned = moments[:, :, 0], moments[:, :, 1].conj(), moments[:, :, 2].conj()
+    index = np.arange(1, powers.shape[1])
+    coefficients = np.zeros((3, powers.shape[0], powers.shape[1] + 1), dtype=complex)
+    coefficients[0, :, 1:-1] = along[:, 1:].conj() / (2 * index)
+    coefficients[1, :, 1:-1] = opposite[:, 1:] / (2 * index)
+    coefficients[1, :, 1:] -= 0.5 * turned
+    coefficients[2, :, 1:] = 0.5 * along.conj()
+    coefficients[0, :, 0] = along[:, 0]  # not of the series: the whole force
+    parts = np.stack([coefficients.real, coefficients.imag], axis=1)  # (3, 2, M, p + 1)
+    return np.ascontiguousarray(parts.reshape(6, *coefficients.shape[1:]).swapaxes(0, 1))
+
+
+@compiled
+def _series(real: Array, imaginary: Array, order: int, wx: Array, wy: Array, x: Array, y: Array) -> None:
+    """Write Σ cₖ wᵏ for k = 1 … order to x + iy, from the real and imaginary parts of the coefficients."""
+    for i in range(x.size):
+        x[i] = 0.0
+        y[i] = 0.0
+    for k in range(order, 0, -1):
+        cx, cy = real[k], imaginary[k]
+        for i in range(x.size):
+            sum_x, sum_y = x[i] + cx, y[i] + cy
+            x[i] = sum_x * wx[i] - sum_y * wy[i]
+            y[i] = sum_x * wy[i] + sum_y * wx[i]
+
+
+@compiled
+def add_series(
+    targets: Array, center_x: float, center_y: float, coefficients: Array, order: int, work: Array, out: Array
+) -> None:
+    """Add to ``out`` (2, n) the velocity that the series of one vesicle, (6, ·), give at targets (2, n).
+
+    ``work`` (6, n) is overwritten.
+    """
+    scale = 1.0 / (4.0 * np.pi)
+    zx, zy, wx, wy, x, y = work[0], work[1], work[2], work[3], work[4], work[5]
+    out_x, out_y = out[0], out[1]
+    force_x, force_y = coefficients[0, 0], coefficients[1, 0]
+    for i in range(zx.size):
+        zx[i] = targets[0, i] - center_x
+        zy[i] = targets[1, i] - center_y
+        square = zx[i] * zx[i] + zy[i] * zy[i]
+        isotropic = scale * (0.5 - 0.5 * logarithm(square))
+        out_x[i] += isotropic * force_x
+        out_y[i] += isotropic * force_y
+        wx[i] = zx[i] / square  # 1/z̄ = z/|z|²
+        wy[i] = zy[i] / square
+    _series(coefficients[0], coefficients[1], order, wx, wy, x, y)
+    for i in range(zx.size):
+        out_x[i] += scale * x[i]
+        out_y[i] -= scale * y[i]
+    _series(coefficients[2], coefficients[3], order, wx, wy, x, y)
+    for i in range(zx.size):
+        out_x[i] += scale * x[i]
+        out_y[i] += scale * y[i]
+    _series(coefficients[4], coefficients[5], order, wx, wy, x, y)
+    for i in range(zx.size):
+        out_x[i] += scale * (zx[i] * x[i] - zy[i] * y[i])
+        out_y[i] += scale * (zx[i] * y[i] + zy[i] * x[i])
+
+
+@compiled
+def velocity(
+    points: Array,
+    point_forces: Array,
+    centers: Array,
+    coefficients: Array,
+    orders: Orders,
+    first: int,
+    result: Array,
+) -> None:
+    """Write the velocity (2, m, N) of m vesicles from ``first`` on: by series, or directly where none serves.
+
+    points : (2, M, N); point_forces, coefficients : (M, 2, N) and (M, 6, ·); orders : (m, M)
+    """
+    count, n = points.shape[1], points.shape[2]
+    sources, forces = np.empty((2, count * n)), np.empty((2, count * n))
+    work = np.empty((6, n))
+    for row in range(result.shape[1]):
+        targets = np.ascontiguousarray(points[:, first + row])
+        used = 0
+        for source in range(count):
+            if orders[row, source] == 0:
+                for component in range(2):
+                    for i in range(n):
+                        sources[component, used + i] = points[component, source, i]
+                        forces[component, used + i] = point_forces[source, component, i]
+                used += n
+        part = direct_velocity(
+            targets, np.ascontiguousarray(sources[:, :used]), np.ascontiguousarray(forces[:, :used])
+        )
+        for source in range(count):
+            order = orders[row, source]
+            if order > 0:
+                add_series(
+                    targets, centers[0, source], centers[1, source], coefficients[source], order, work, part
+                )
+        result[:, row] = part
