@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections import deque
 from collections.abc import Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass, field
@@ -33,7 +34,7 @@ class Intake:
         self._database = database
         # RETURNING names those that are new; an idempotency key that is there already adds no job.
         self._insert = _INSERT[database.dialect](JobRow).on_conflict_do_nothing().returning(JobRow.id)
-        self._arrivals: list[_Arrival] = []
+        self._arrivals: deque[_Arrival] = deque()
         self._turn = threading.Lock()
 
     def add(self, row: Mapping[str, Any], most_unfinished: int | None) -> bool:
@@ -49,7 +50,9 @@ class Intake:
         return arrival.accepted.result()
 
     def _take_all(self) -> None:
-        arrivals, self._arrivals = self._arrivals, []
+        arrivals = []
+        while self._arrivals:  # one by one: another thread may be adding to them
+            arrivals.append(self._arrivals.popleft())
         try:
             with self._database.begin() as connection:
                 new = self._new(connection, arrivals)

@@ -18,6 +18,10 @@ Array = NDArray[np.float64]
 T = TypeVar("T")
 
 
+class RanksDifferError(RuntimeError):
+    """The ranks of a run no longer take the same path; the job must end, or they would wait for ever."""
+
+
 class Shares(Protocol):
     """A division of rows: those of this rank are neighbors."""
 
@@ -149,3 +153,20 @@ def first_rank_asks(parallel: Parallel, question: Callable[[], bool] | None) -> 
     if not parallel.agree(question is not None):
         return None
     return lambda: parallel.agree(bool(question and parallel.rank == 0 and question()))
+
+
+def require_agreement(parallel: Parallel, value: float) -> None:
+    """Check that all ranks have come to the same number.
+
+    Collective.
+
+    Raises
+    ------
+    RanksDifferError
+        On a rank that has another number than the first one.
+    """
+    if (first := parallel.agree(value)) != value:
+        raise RanksDifferError(
+            f"rank {parallel.rank} of a run has come to {value!r} and the first one to {first!r}: "
+            "do their processors round alike?"
+        )

@@ -15,7 +15,7 @@ from solver.geometry import Membranes
 from solver.integrators import StepFailedError
 from solver.orbit import Orbit
 from solver.outcome import History, criteria_of, latest_time, may_tumble
-from solver.parallel import SERIAL, Parallel, first_rank_asks
+from solver.parallel import SERIAL, Parallel, first_rank_asks, require_agreement
 from solver.resolution import UnresolvedError, carried, resolution_of, with_points
 from solver.run import LARGEST_SPATIAL, Energy, Errors, Outcome, Run, Work
 from solver.scene import Scene, Shear, Start
@@ -91,6 +91,7 @@ def simulate(
         stage.begin(0.0, start.state, latest)
         while progress.time < latest and outcome is Outcome.UNDECIDED:
             step = stage.step()
+            require_agreement(parallel, step.end)
             points = resolution.finer(stage.membranes, step.end, step.state)
             if points is not None:
                 coarse, stage = stage.membranes, Stage(with_points(scene, points), stage.cost, parallel)

@@ -110,6 +110,19 @@ with abort_guard(communicator):
 """
 
 
+DIFFERING = """
+from ensemble.mpi import abort_guard, world
+from solver.parallel import Ranks
+from solver.simulate import simulate
+from tests.solver.ranks import DOUBLET
+communicator = world()
+with abort_guard(communicator):
+    tolerance = DOUBLET.numerics.tolerance * (1 + 1e-9 * communicator.Get_rank())
+    numerics = DOUBLET.numerics.model_copy(update={"tolerance": tolerance})
+    simulate(DOUBLET.model_copy(update={"numerics": numerics}), parallel=Ranks(communicator))
+"""
+
+
 def run(launcher: Any, ranks: int, code: str) -> subprocess.CompletedProcess[str]:
     completed: subprocess.CompletedProcess[str] = launcher.run(ranks, [sys.executable, "-c", code])
     return completed
@@ -122,8 +135,14 @@ def test_more_ranks_than_rows(launcher: Any) -> None:
 
 def test_an_exception_on_one_rank_of_a_run_ends_the_job(launcher: Any) -> None:
     result = run(launcher, 2, FAILING)
-    assert result.returncode == 1
+    assert result.returncode != 0
     assert "this rank broke" in result.stderr
+
+
+def test_ranks_that_no_longer_agree_end_the_job(launcher: Any) -> None:
+    result = run(launcher, 2, DIFFERING)
+    assert result.returncode != 0
+    assert "do their processors round alike?" in result.stderr
 
 
 def test_the_first_rank_alone_is_asked_whether_to_stop_and_stops_all(launcher: Any) -> None:
