@@ -16,6 +16,7 @@ from solver import simulate as time_loop
 from solver.curve import positions
 from solver.dynamics import Dynamics
 from solver.geometry import Geometry, Membranes
+from solver.parallel import Parallel
 from solver.resolution import (
     LADDER,
     AdaptiveResolution,
@@ -286,8 +287,8 @@ def test_the_work_of_all_parts_adds_up(monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[Dynamics] = []
     original = Dynamics.of
 
-    def of(scene: Scene) -> Dynamics:
-        made.append(original(scene))
+    def of(scene: Scene, parallel: Parallel) -> Dynamics:
+        made.append(original(scene, parallel))
         return made[-1]
 
     monkeypatch.setattr(Dynamics, "of", of)
