@@ -97,8 +97,8 @@ def _figure(treading: Mapping[float, Bracket], adhesion: Mapping[float, Bracket]
     left.text(0.75, 1.8, "tank-treading")
     draw_brackets(left, treading, BLACK, "bracket")
     left.legend(loc="upper left")
-    right.set(xlabel=_CONTRAST.label, ylabel=_HAMAKER.label, xlim=(0, None))
     draw_brackets(right, adhesion, BLACK, "bracket")
+    right.set(xlabel=_CONTRAST.label, ylabel=_HAMAKER.label, xscale="log")
     return figure
 
 
