@@ -48,8 +48,8 @@ def _course(quick: bool) -> Course:
             "around a steady shape and tumbles.  The theory of Keller and Skalak, in two dimensions, takes "
             "it for an ellipse with a linear velocity on it; shapes that bending and flow choose freely, "
             "and a velocity that does not stretch the membrane anywhere, tread up to somewhat larger "
-            "contrasts.  The more viscous the vesicles of a doublet, the less adhesion it needs: like rigid "
-            "bodies on one streamline they pass round each other on closed paths.",
+            "contrasts.  A doublet of more viscous vesicles needs a little less adhesion, up to a contrast of 4; "
+            "at 8 outcomes against H are not monotone, so that no single critical value exists.",
             Drawing(
                 "contrast",
                 "Left: contrast beyond which a vesicle tumbles, shear rate 1; gray: Keller and Skalak's "
@@ -99,6 +99,8 @@ def _figure(treading: Mapping[float, Bracket], adhesion: Mapping[float, Bracket]
     left.legend(loc="upper left")
     draw_brackets(right, adhesion, BLACK, "bracket")
     right.set(xlabel=_CONTRAST.label, ylabel=_HAMAKER.label, xscale="log")
+    right.set_xticks(list(adhesion), [f"{contrast:g}" for contrast in adhesion], minor=False)
+    right.minorticks_off()
     return figure
 
 
