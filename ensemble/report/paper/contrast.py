@@ -48,8 +48,8 @@ def _course(quick: bool) -> Course:
             "around a steady shape and tumbles.  The theory of Keller and Skalak, in two dimensions, takes "
             "it for an ellipse with a linear velocity on it; shapes that bending and flow choose freely, "
             "and a velocity that does not stretch the membrane anywhere, tread up to somewhat larger "
-            "contrasts.  A doublet of more viscous vesicles needs a little less adhesion, up to a contrast of "
-            "4; at 8 outcomes against H are not monotone, so that no single critical value exists.",
+            "contrasts.  A doublet of more viscous vesicles needs a little less adhesion, up to a contrast "
+            "of 4; at 8 outcomes against H are not monotone, so that no single critical value exists.",
             Drawing(
                 "contrast",
                 "Left: contrast beyond which a vesicle tumbles, shear rate 1; gray: Keller and Skalak's "

@@ -81,7 +81,7 @@ def _course(quick: bool) -> Course:
             _area_drawing(results, by_area),
             [*_area_rows(results, by_area), _trend_row(results, by_area)],
             "Vesicles of unequal reduced area, length or bending modulus are the paper's future work as "
-            "well.  At rest the softer of two strongly adhering vesicles (H = 5, δ = 0.2) wraps the other.",
+            "well.  At rest (H = 5, δ = 0.2) the slacker of two vesicles bends around the other.",
             Drawing("shapes", "Unequal pairs at equilibrium, colored by tension.", _shapes(runs)),
             [_wrapping_row(name, run, shapes[name]) for name, run in runs.items()],
             *([[_unequal_row(results, name, study) for name, study in studies.items()]] if studies else []),
