@@ -2,8 +2,8 @@
 
 Every rank of a group takes the same path through a run.  A row is computed by one rank alone and then known
 to all, and nothing is summed across ranks: so all have the same state to the last bit, and decide alike.
-(Their processors must round alike; a group is best made of one kind.)  With another number of ranks a row
-differs by round-off only, where the rows of a matrix product are other ones.
+(Their processors must round alike, which is checked after every step by `require_agreement`.)  With another
+number of ranks a row differs by round-off only, where the rows of a matrix product are other ones.
 """
 
 from __future__ import annotations

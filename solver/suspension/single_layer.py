@@ -112,15 +112,12 @@ class SummedSingleLayer:
         Distance over spacing below which a target is near.
     shares : Shares
         Of the vesicles, in the last geometry assembled.
-    sums : int
-        How many sums over all points have been made.
     """
 
     shares: Shares
 
     def __init__(self, membranes: Membranes, accuracy: float, parallel: Parallel) -> None:
         self.ratio = required_ratio(1.0, accuracy)
-        self.sums = 0
         self._accuracy = accuracy
         self._parallel = parallel
         self._correction = logarithm_correction(membranes.points)
@@ -164,7 +161,6 @@ class SummedSingleLayer:
 
         Collective.
         """
-        self.sums += 1
         geometry, own = self._geometry, self.shares.own
         _, count, points = own_forces.shape
         sent = np.empty((count, 2 * points + 6 * (LARGEST_ORDER + 1)))
