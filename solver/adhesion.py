@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver import scene
-from solver.adhesion_kernels import adhesion_density, adhesion_energies, adhesion_hessians
+from solver.adhesion_kernels import Potential
+from solver.adhesion_sums import AnyPotential, add_density, fill_hessian, summed_energy
 from solver.geometry import Geometry
 from solver.parallel import SERIAL, Parallel, Shares
 from solver.proximity import Proximity
@@ -23,8 +24,8 @@ from solver.refinement import MAXIMUM_FACTOR, Refinement, sum_costs, within
 Array = NDArray[np.float64]
 
 
-class Adhesion:
-    """Adhesion over all pairs of vesicles.
+class SharedAdhesion:
+    """What all kinds of adhesion have in common: a potential, and how ranks share the points it acts on.
 
     Parameters
     ----------
@@ -40,51 +41,79 @@ class Adhesion:
         Distance over spacing to which sources are refined for a target.
     """
 
-    def __init__(self, parameters: scene.Adhesion, accuracy: float, parallel: Parallel = SERIAL) -> None:
+    def __init__(self, parameters: scene.Adhesion, accuracy: float, parallel: Parallel) -> None:
         self._parallel = parallel
         m, n = parameters.exponents
-        self._potential = parameters.distance, m, n
+        self._potential: AnyPotential = Potential(parameters.distance, m, n)
         self._hamaker = parameters.hamaker
+        self._strength = parameters.hamaker * m  # by which the kernels of the force are multiplied
         # Over a nearly straight membrane the force kernel is like 1/(s² + d²)^(m/2 + 1).
         self._order = 0.5 * m + 1
         self.ratio = required_ratio(self._order, accuracy)
 
+    def sum_error(self, closeness: Proximity) -> float:
+        """Relative error of the force between the closest membranes, refined as far as it goes."""
+        return trapezoid_error(self._order, MAXIMUM_FACTOR * min(closeness.nearest, self.ratio))
+
+    def _share(
+        self, geometry: Geometry, refinement: Refinement, curves: int = 0, again: int = 0
+    ) -> tuple[Shares, Refinement]:
+        """How the points are shared out, and this rank's part of a refinement.
+
+        Every point costs sums over so many ``curves`` as they are, and ``again`` one for each of its groups,
+        beside those over refined ones.
+        """
+        size = geometry.points[0].size
+        shares = self._parallel.divide(
+            size, lambda: curves + sum_costs(refinement, again + refinement.groups[:, 2].astype(float), size)
+        )
+        return shares, within(refinement, shares.own, size)
+
+    def _total(self, energy: float, geometry: Geometry) -> float:
+        """The energy of all ranks' points and of their images, from φ/H summed over this rank's points."""
+        each = self._parallel.divide(self._parallel.size).gather(np.array([energy]))
+        return float(geometry.membranes.copies * self._hamaker * each.sum())
+
+
+class Adhesion(SharedAdhesion):
+    """Adhesion over all pairs of a few vesicles; see `SharedAdhesion`."""
+
+    def __init__(self, parameters: scene.Adhesion, accuracy: float, parallel: Parallel = SERIAL) -> None:
+        super().__init__(parameters, accuracy, parallel)
+
     def density(self, geometry: Geometry, closeness: Proximity) -> Array:
         """Force per length, (2, M, N)."""
+        shares, sums = self._sums(geometry, closeness)
         density = np.zeros_like(geometry.points)
-        shares, arguments = self._share(geometry, closeness)
-        adhesion_density(*arguments, density)
-        own = density.reshape(2, -1)[:, shares.own]
-        return shares.gather(own, axis=1).reshape(density.shape)
+        add_density(*sums, self._strength, density)
+        return gathered(shares, density)
 
     def jacobian(self, geometry: Geometry, closeness: Proximity) -> Array:
         """Derivative of `density` by the state, (2, M·N, state)."""
         membranes = geometry.membranes
         size = membranes.count * membranes.points
         hessian = np.empty((2, size, 2, membranes.copies * size))
-        shares, arguments = self._share(geometry, closeness)
-        adhesion_hessians(*arguments, hessian)
+        shares, sums = self._sums(geometry, closeness)
+        fill_hessian(*sums, self._strength, hessian)
         own = hessian[:, shares.own]
         return shares.gather(geometry.by_state(membranes.fold(own)), axis=1)
 
-    def _share(self, geometry: Geometry, closeness: Proximity) -> tuple[Shares, tuple[Any, ...]]:
-        """Which points are this rank's, and what the compiled sums of forces on them are given."""
-        refinement = closeness.refinement(self.ratio)
-        size = geometry.membranes.count * geometry.membranes.points
-        shares = self._parallel.divide(
-            size, lambda: sum_costs(refinement, refinement.groups[:, 2].astype(float), size)
-        )
-        sums = self._sums(geometry, within(refinement, shares.own, size))
-        return shares, (*sums, self._hamaker * self._potential[1])
-
-    def _sums(self, geometry: Geometry, refinement: Refinement) -> tuple[Any, ...]:
-        return geometry.curve_points, geometry.membranes.curve_spacing, refinement, *self._potential
-
-    def sum_error(self, closeness: Proximity) -> float:
-        """Relative error of the force between the closest membranes, refined as far as it goes."""
-        return trapezoid_error(self._order, MAXIMUM_FACTOR * closeness.nearest)
-
     def energy(self, geometry: Geometry, closeness: Proximity) -> float:
         """∫∫ φ ds ds summed over all pairs."""
-        energy = adhesion_energies(*self._sums(geometry, closeness.refinement(self.ratio)))
-        return float(geometry.membranes.copies * self._hamaker * energy)
+        _, sums = self._sums(geometry, closeness)
+        return self._total(summed_energy(*sums), geometry)
+
+    def _sums(self, geometry: Geometry, closeness: Proximity) -> tuple[Shares, tuple[Any, ...]]:
+        """How the points are shared out, and what the compiled sums over this rank's are given."""
+        refinement = self._refinement(closeness)
+        shares, own = self._share(geometry, refinement)
+        return shares, (geometry.curve_points, geometry.membranes.curve_spacing, own, self._potential)
+
+    def _refinement(self, closeness: Proximity) -> Refinement:
+        return closeness.refinement(self.ratio)
+
+
+def gathered(shares: Shares, values: Array) -> Array:
+    """Values (k, M, N) at all points, of which this rank has found those of its share."""
+    own = values.reshape(len(values), -1)[:, shares.own]
+    return shares.gather(own, axis=1).reshape(values.shape)

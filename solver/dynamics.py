@@ -73,7 +73,7 @@ def _adhesion(
     if parameters is None:
         return None
     if parameters.cutoff is not None:
-        return TruncatedAdhesion(parameters, accuracy, membranes)
+        return TruncatedAdhesion(parameters, accuracy, membranes, parallel)
     return Adhesion(parameters, accuracy, parallel)
 
 

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 from solver.compilation import compiled
 from solver.geometry import Geometry
 from solver.kernels import distances
-from solver.refinement import MAXIMUM_FACTOR, Refinement, refinement_factors
+from solver.refinement import MAXIMUM_FACTOR, Refinement, group_targets
 from solver.spectral import interpolation, interpolations
 
 Array = NDArray[np.float64]
@@ -47,30 +47,6 @@ def _near_distances(
                 out[pair, rows[k]] = found[k]
 
 
-@compiled
-def _group_near(pairs: Indices, distances: Array, ratio: float) -> tuple[Indices, Indices, Indices]:
-    """Make the groups, rows and starts of a `Refinement` of the targets that need a factor of 2 or more."""
-    groups = [(0, 0, 0)][:0]
-    rows = np.empty(distances.size, dtype=np.int64)
-    starts = [0]
-    used = 0
-    for pair in range(pairs.shape[0]):
-        factors = refinement_factors(distances[pair], ratio)
-        factor = 2
-        while factor <= factors.max():
-            found = np.flatnonzero(factors == factor)
-            if found.size > 0:
-                rows[used : used + found.size] = found
-                used += found.size
-                groups.append((pairs[pair, 0], pairs[pair, 1], factor))
-                starts.append(used)
-            factor *= 2
-    table = np.empty((len(groups), 3), dtype=np.int64)
-    for g in range(len(groups)):
-        table[g, 0], table[g, 1], table[g, 2] = groups[g]
-    return table, rows[:used], np.array(starts)
-
-
 class Neighbors:
     """Pairs of vesicles that are near each other.
 
@@ -93,7 +69,7 @@ class Neighbors:
 
     def __init__(self, geometry: Geometry, reach: float) -> None:
         membranes = geometry.membranes
-        self._points = membranes.points
+        self._points, self._curves = membranes.points, membranes.count
         centers = geometry.centers
         radii = np.sqrt(np.max(np.sum((geometry.points - centers[:, :, None]) ** 2, axis=0), axis=1))
         allowed = reach * membranes.spacing
@@ -124,15 +100,16 @@ class Neighbors:
         self.distances = values[near] / membranes.spacing[self.pairs[:, 1], None]
         self.nearest = float(self.distances.min(initial=np.inf))
 
-    def refinement(self, ratio: float) -> Refinement:
-        """The refinement that brings every target to ``ratio`` spacings of every source.
+    def refinement(self, ratio: float, limits: Array | None = None) -> Refinement:
+        """See `proximity.Proximity`.  Without limits, without the targets that need none.
 
-        Without the targets that need none; ``ratio`` is at most the reach.
+        ``ratio`` and ``limits`` are at most the reach.
         """
         factor = 1
         while factor < MAXIMUM_FACTOR and factor * self.nearest < ratio:
             factor *= 2
-        groups, rows, starts = _group_near(self.pairs, self.distances, ratio)
+        limits = np.full(self._curves, ratio) if limits is None else limits
+        groups, rows, starts = group_targets(self.pairs, self.distances, ratio, limits)
         return Refinement(groups, rows, starts, interpolations(self._points, factor))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Protocol
 
 import numpy as np
@@ -21,8 +22,18 @@ class Proximity(Protocol):
 
     nearest: float  # distance over spacing
 
-    def refinement(self, ratio: float) -> Refinement:
-        """The refinement that brings every target to ``ratio`` spacings of every source."""
+    def refinement(self, ratio: float, limits: Array | None = None) -> Refinement:
+        """The refinement that brings every target to ``ratio`` spacings of every source.
+
+        ``limits`` (C,) are the distances over spacing of each curve within which targets are in it; without,
+        all are that are known to need a sum of their own.
+        """
+
+
+@cache
+def all_pairs(count: int, curves: int) -> NDArray[np.int64]:
+    """All pairs (count·curves, 2) of a vesicle and a curve, itself among them."""
+    return np.argwhere(np.ones((count, curves)))
 
 
 class Closeness:
@@ -46,12 +57,16 @@ class Closeness:
         self.distances /= spacing[:, None]
         self.nearest = float(self.distances.min())
 
-    def refinement(self, ratio: float) -> Refinement:
-        """The refinement that brings every target to ``ratio`` spacings of every source."""
+    def refinement(self, ratio: float, limits: Array | None = None) -> Refinement:
+        """See `Proximity`.  Without limits every target is in a group of every other curve."""
         factor = 1
         while factor < MAXIMUM_FACTOR and factor * self.nearest < ratio:
             factor *= 2
-        groups, rows, starts = group_targets(self.distances, ratio)
+        count, curves, points = self.distances.shape
+        # No curve is at a finite distance from itself.
+        limits = np.full(curves, np.inf) if limits is None else limits
+        pairs = all_pairs(count, curves)
+        groups, rows, starts = group_targets(pairs, self.distances.reshape(-1, points), ratio, limits)
         return Refinement(groups, rows, starts, interpolations(self._points, factor))
 
 

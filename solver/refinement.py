@@ -25,8 +25,8 @@ class Refinement(NamedTuple):
     """Which targets see which vesicle at which factor.
 
     groups : (k, 3)
-        Target vesicle, source curve and factor of each group of targets; every target is in exactly one
-        group of every other curve.
+        Target vesicle, source curve and factor of each group of targets; a target is in at most one group of
+        every other curve.
     rows, starts : (·,), (k + 1,)
         ``rows[starts[g]:starts[g + 1]]`` are the points of group g within their vesicle.
     interpolations : (·, n)
@@ -50,35 +50,41 @@ def refinement_factors(distance_per_spacing: Array, ratio: float) -> Indices:
 
 
 @compiled
-def group_targets(distances: Array, ratio: float) -> tuple[Indices, Indices, Indices]:
-    """Make the groups, rows and starts of `Refinement`.
+def group_targets(
+    pairs: Indices, distances: Array, ratio: float, limits: Array
+) -> tuple[Indices, Indices, Indices]:
+    """Make the groups, rows and starts of a `Refinement`.
 
-    distances : (M, C, n)
-        Distance over spacing, by target vesicle, source curve and point of the target.
+    pairs : (k, 2)
+        Target vesicle and source curve.
+    distances : (k, n)
+        Distance over spacing, by pair and point of the target.
+    limits : (C,)
+        Points at this distance from a source curve, or beyond, are left out.
     """
-    count, curves, n = distances.shape
     groups = [(0, 0, 0)][:0]
-    rows = np.empty(count * (curves - 1) * n, dtype=np.int64)
+    rows = np.empty(distances.size, dtype=np.int64)
     starts = [0]
     used = 0
-    for target in range(count):
-        for source in range(curves):
-            if target == source:
-                continue
-            factors = refinement_factors(distances[target, source], ratio)
-            factor = 1
-            while factor <= factors.max():
-                found = np.flatnonzero(factors == factor)
-                if found.size > 0:
-                    rows[used : used + found.size] = found
-                    used += found.size
-                    groups.append((target, source, factor))
-                    starts.append(used)
-                factor *= 2
+    for pair in range(pairs.shape[0]):
+        target, source = pairs[pair]
+        factors = refinement_factors(distances[pair], ratio)
+        for i in range(factors.size):
+            if distances[pair, i] >= limits[source]:
+                factors[i] = 0
+        factor = 1
+        while factor <= factors.max():
+            found = np.flatnonzero(factors == factor)
+            if found.size > 0:
+                rows[used : used + found.size] = found
+                used += found.size
+                groups.append((target, source, factor))
+                starts.append(used)
+            factor *= 2
     table = np.empty((len(groups), 3), dtype=np.int64)
     for g in range(len(groups)):
         table[g, 0], table[g, 1], table[g, 2] = groups[g]
-    return table, rows, np.array(starts)
+    return table, rows[:used], np.array(starts)
 
 
 def within(refinement: Refinement, own: slice, size: int) -> Refinement:

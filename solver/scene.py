@@ -203,8 +203,4 @@ class Scene(Model):
                 f"numerics.integrator 'rosenbrock' takes at most {LARGEST_DENSE} vesicles, "
                 f"got {len(self.vesicles)}: it needs the exact Jacobian"
             )
-        if self.many and self.adhesion and self.adhesion.cutoff is not None:
-            raise ValueError(
-                f"adhesion.cutoff takes at most {LARGEST_DENSE} vesicles, got {len(self.vesicles)}"
-            )
         return self

@@ -15,13 +15,26 @@ from solver.geometry import Geometry, Membranes
 from solver.integrators.blocks import BlockDiagonal
 from solver.neighbors import Neighbors
 from solver.parallel import Parallel
+from solver.scene import Adhesion as AdhesionParameters
 from solver.scene import Scene
 from solver.suspension.adhesion import SummedAdhesion
 from solver.suspension.single_layer import SummedSingleLayer
 from solver.suspension.tension import Preconditioner, SummedInextensibility
 from solver.tension import Inextensibility
+from solver.truncated_adhesion import TruncatedAdhesion
 
 Array = NDArray[np.float64]
+
+
+def _adhesion(
+    parameters: AdhesionParameters | None, accuracy: float, membranes: Membranes, parallel: Parallel
+) -> SummedAdhesion | TruncatedAdhesion | None:
+    """The adhesion that many vesicles have."""
+    if parameters is None:
+        return None
+    if parameters.cutoff is not None:
+        return TruncatedAdhesion(parameters, accuracy, membranes, parallel)
+    return SummedAdhesion(parameters, accuracy, parallel)
 
 
 @dataclass
@@ -35,7 +48,7 @@ class Suspension:
     parallel: Parallel
     membranes: Membranes
     bending: Bending
-    adhesion: SummedAdhesion | None
+    adhesion: SummedAdhesion | TruncatedAdhesion | None
     flow: ImposedFlow | None
     inextensibility: SummedInextensibility
     layer: SummedSingleLayer
@@ -53,7 +66,7 @@ class Suspension:
             parallel=parallel,
             membranes=membranes,
             bending=Bending(),
-            adhesion=SummedAdhesion(scene.adhesion, accuracy, parallel) if scene.adhesion else None,
+            adhesion=_adhesion(scene.adhesion, accuracy, membranes, parallel),
             flow=imposed_flow(scene.flow, membranes) if scene.flow else None,
             inextensibility=SummedInextensibility(accuracy),
             layer=SummedSingleLayer(membranes, accuracy, parallel),
@@ -62,7 +75,7 @@ class Suspension:
     @property
     def reach(self) -> float:
         """Distance over spacing within which a term sees the points of a vesicle refined."""
-        return max(self.layer.ratio, self.adhesion.ratio if self.adhesion else 0.0)
+        return max(self.layer.ratio, self.adhesion.reach if self.adhesion else 0.0)
 
     def motion(self, state: Array) -> Motion:
         """Velocity, tension and forces in a state."""

@@ -12,9 +12,10 @@ from ensemble.mpi import abort_guard, world
 from solver.dynamics import Dynamics
 from solver.parallel import SERIAL, Parallel, Ranks
 from solver.run import Run
-from solver.scene import LARGEST_DENSE, Numerics, Scene, Shear, Trap, Vesicle
+from solver.scene import LARGEST_DENSE, Adhesion, Numerics, Scene, Shear, Trap, Vesicle
 from solver.simulate import simulate
 from solver.start import placed_state
+from solver.suspension import Suspension
 from tests.solver.scenes import shear_pair, uneven_pair
 from tests.solver.suspensions import suspension
 
@@ -28,7 +29,9 @@ SCENES = {
         flow=Trap(rate=0.3),
         vesicles=(Vesicle(center=(-0.8, 0.0)), Vesicle(length=5.0, center=(0.6, 0.0), angle=1.4)),
     ),
+    "cutoff": uneven_pair(adhesion=Adhesion(hamaker=1.5, distance=0.4, cutoff=1.1)),
 }
+CUTOFF = suspension(LARGEST_DENSE + 1, adhesion=Adhesion(hamaker=1.0, distance=0.4, cutoff=1.2))
 MANY = suspension(LARGEST_DENSE + 1, horizon=0.2)
 DOUBLET = shear_pair(3.5, numerics=Numerics(points=32, tolerance=1e-3))
 
@@ -37,6 +40,15 @@ def linearized(scene: Scene, parallel: Parallel) -> tuple[Array, Array]:
     """Right-hand side and Jacobian where a scene begins."""
     dynamics, state = Dynamics.of(scene, parallel), placed_state(scene)
     return dynamics.rate(state), dynamics.jacobian(state)
+
+
+def summed(scene: Scene, parallel: Parallel) -> tuple[Array, Array]:
+    """Right-hand side and energy of adhesion of many vesicles where a scene begins."""
+    sums = Suspension.of(scene, parallel)
+    motion = sums.motion(placed_state(scene))
+    assert sums.adhesion
+    assert motion.closeness
+    return sums.rate_of(motion), np.array([sums.adhesion.energy(motion.geometry, motion.closeness)])
 
 
 def summary(run: Run) -> Array:
@@ -52,6 +64,8 @@ def computed(parallel: Parallel) -> dict[str, Array]:
     found = {}
     for name, scene in SCENES.items():
         found[f"{name} rate"], found[f"{name} jacobian"] = linearized(scene, parallel)
+    found["many rate"], found["many energy"] = summed(MANY, parallel)
+    found["many cutoff rate"], found["many cutoff energy"] = summed(CUTOFF, parallel)
     found["many"] = summary(simulate(MANY, parallel=parallel))
     found["doublet"] = summary(simulate(DOUBLET, parallel=parallel))
     return found

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from solver.adhesion import Adhesion
-from solver.adhesion_kernels import adhesion_energy, adhesion_force
+from solver.adhesion_kernels import Potential, adhesion_energy, adhesion_force
 from solver.geometry import Geometry
 from solver.proximity import Closeness, gap
 from solver.scene import Adhesion as AdhesionParameters
@@ -239,14 +239,15 @@ def test_parallel_lines(
     end = (count + 0.5) * spacing
     line = np.stack([x, np.zeros_like(x)])
     m, n = exponents
+    potential = Potential(distance, m, n)
     force = np.empty((2, 1))
 
     def pull(d: float) -> float:
-        adhesion_force(np.array([[0.0], [d]]), line, distance, m, n, spacing, force)
+        adhesion_force(np.array([[0.0], [d]]), line, potential, spacing, force)
         return float(force[1, 0])
 
     equilibrium = brentq(pull, 0.7 * distance, 1.2 * distance, xtol=1e-13)
     assert equilibrium / distance == pytest.approx(separation[0], abs=separation[1])
-    near = spacing * adhesion_energy(np.array([[0.0], [equilibrium]]), line, distance, m, n)
+    near = spacing * adhesion_energy(np.array([[0.0], [equilibrium]]), line, potential)
     beyond = -2 * m / n * distance**n * end ** (1 - n) / (n - 1)  # the attraction of the ends left out
     assert (near + beyond) / distance == pytest.approx(energy[0], abs=energy[1])

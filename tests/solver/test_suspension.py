@@ -11,6 +11,8 @@ from pydantic import ValidationError
 
 from solver import suspension as suspension_module
 from solver.adhesion import Adhesion as FewAdhesion
+from solver.adhesion_kernels import Potential
+from solver.adhesion_sums import fill_hessian
 from solver.direct_sum import velocity as direct_velocity
 from solver.dynamics import Dynamics
 from solver.equation import equation_of_motion
@@ -26,6 +28,8 @@ from solver.simulate import simulate
 from solver.start import placed_state
 from solver.suspension import Suspension, multipoles
 from solver.suspension.adhesion import SummedAdhesion
+from solver.suspension.far_adhesion import seen
+from solver.truncated_adhesion import TruncatedAdhesion
 from tests.solver.steps import all_steps, fixed_steps
 from tests.solver.suspensions import suspension
 
@@ -53,8 +57,9 @@ def close_together(points: int, **fields: Any) -> Scene:
         {"flow": Shear(rate=0.8)},
         {"flow": Extension(rate=0.3), "adhesion": Adhesion(hamaker=1.5, distance=0.3)},
         {"flow": Trap(rate=0.3), "adhesion": Adhesion(hamaker=1.5, distance=0.3, exponents=(5, 3))},
+        {"adhesion": Adhesion(hamaker=1.5, distance=0.3, cutoff=1.2)},
     ],
-    ids=lambda fields: fields["flow"].kind,
+    ids=["shear", "extension", "trap", "cutoff"],
 )
 def test_sums_and_matrices_give_the_same_motion(fields: dict[str, Any]) -> None:
     scene = close_together(64, **fields)
@@ -128,9 +133,10 @@ def test_blocks_of_the_jacobian_are_those_of_vesicles_far_from_the_others() -> N
     np.testing.assert_allclose(solve(direction - 0.1 * (found @ direction)), direction, rtol=0, atol=1e-9)
 
 
-def test_blocks_contain_how_others_draw_a_vesicle() -> None:
+@pytest.mark.parametrize("cutoff", [None, 1.2])
+def test_blocks_contain_how_others_draw_a_vesicle(cutoff: float | None) -> None:
     """Against differences of the adhesion force while one vesicle is shifted."""
-    scene = suspension(4, 64, 1e-9)
+    scene = suspension(4, 64, 1e-9, adhesion=Adhesion(hamaker=1.0, distance=0.4, cutoff=cutoff))
     sums, state, step = Suspension.of(scene, SERIAL), placed_state(scene), 1e-5
     assert sums.adhesion
     membranes = sums.membranes
@@ -170,13 +176,29 @@ def test_series_give_the_sum_over_points_as_accurately_as_asked(accuracy: float)
     np.testing.assert_allclose(found, expected, rtol=0, atol=accuracy * np.max(np.abs(expected)))
 
 
-def test_adhesion_between_far_vesicles_needs_few_of_their_points() -> None:
-    geometry = scattered(25, 64)
-    parameters = Adhesion(hamaker=1.0, distance=0.4)
-    near = Neighbors(geometry, 6.0)
-    found = SummedAdhesion(parameters, 1e-7, SERIAL).density(geometry, near)
-    expected = FewAdhesion(parameters, 1e-7).density(geometry, Closeness(geometry))
-    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6 * np.max(np.abs(expected)))
+@pytest.mark.parametrize("accuracy", [1e-5, 1e-7, 1e-9])
+@pytest.mark.parametrize("exponents", [(4, 2), (5, 3)])
+def test_adhesion_between_far_vesicles_needs_few_of_their_points(
+    accuracy: float, exponents: tuple[int, int]
+) -> None:
+    geometry = scattered(16, 64)
+    parameters = Adhesion(hamaker=1.0, distance=0.4, exponents=exponents)
+    near, everyone = Neighbors(geometry, 8.0), Closeness(geometry)
+    sums, exact = SummedAdhesion(parameters, accuracy, SERIAL), FewAdhesion(parameters, 1e-12)
+    needed = -2 * float(np.log(accuracy))
+    assert all(sources.shape[1] < 15 * 64 for *_, sources in seen(geometry, slice(0, 16 * 64), needed))
+    expected = exact.density(geometry, everyone)
+    allowed = 10 * accuracy * np.max(np.abs(expected))
+    np.testing.assert_allclose(sums.density(geometry, near), expected, rtol=0, atol=allowed)
+    assert sums.energy(geometry, near) == pytest.approx(exact.energy(geometry, everyone), rel=accuracy)
+    hessian = np.empty((2, 16 * 64, 2, 16 * 64))
+    spacing, potential = geometry.membranes.spacing, Potential(0.4, *exponents)
+    groups = everyone.refinement(exact.ratio)
+    fill_hessian(geometry.points, spacing, groups, potential, float(exponents[0]), hessian)
+    rows = np.arange(16 * 64)
+    stiffness = np.stack([hessian[a, rows, b, rows] for a, b in ((0, 0), (0, 1), (1, 1))])
+    found = sums.stiffness(geometry, near).reshape(3, -1)
+    np.testing.assert_allclose(found, stiffness, rtol=0, atol=10 * accuracy * np.max(np.abs(stiffness)))
 
 
 # --- Neighbors --------------------------------------------------------------------------------------------
@@ -262,6 +284,7 @@ def test_terms_that_a_scene_lacks_are_never_constructed(monkeypatch: pytest.Monk
         raise AssertionError("constructed")
 
     monkeypatch.setattr(suspension_module.dynamics, "SummedAdhesion", refuse)
+    monkeypatch.setattr(suspension_module.dynamics, "TruncatedAdhesion", refuse)
     monkeypatch.setattr(suspension_module.dynamics, "imposed_flow", refuse)
     scene = suspension(LARGEST_DENSE + 1, adhesion=None, flow=None)
     sums = Suspension.of(scene, SERIAL)
@@ -270,13 +293,32 @@ def test_terms_that_a_scene_lacks_are_never_constructed(monkeypatch: pytest.Monk
 
 
 @pytest.mark.parametrize(
-    ("fields", "named"),
-    [
-        ({"numerics": Numerics(integrator="rosenbrock")}, "numerics.integrator"),
-        ({"adhesion": Adhesion(hamaker=1.0, distance=0.4, cutoff=1.0)}, "adhesion.cutoff"),
-    ],
+    ("cutoff", "needless"), [(None, "TruncatedAdhesion"), (1.2, "SummedAdhesion")], ids=["without", "with"]
 )
-def test_what_serves_few_vesicles_only_is_refused(fields: dict[str, Any], named: str) -> None:
-    with pytest.raises(ValidationError, match=named):
-        suspension(LARGEST_DENSE + 1, **fields)
-    suspension(LARGEST_DENSE, **fields)
+def test_a_cutoff_is_constructed_where_there_is_one(
+    cutoff: float | None, needless: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: Any) -> None:
+        raise AssertionError("constructed")
+
+    monkeypatch.setattr(suspension_module.dynamics, needless, refuse)
+    adhesion = Adhesion(hamaker=1.0, distance=0.4, cutoff=cutoff)
+    assert Suspension.of(suspension(LARGEST_DENSE + 1, adhesion=adhesion), SERIAL).adhesion
+
+
+def test_beyond_the_cutoff_many_vesicles_feel_nothing() -> None:
+    geometry = scattered(9, 64)
+    nearest = gap(geometry)
+    parameters = Adhesion(hamaker=1.0, distance=0.1, cutoff=0.9 * nearest)
+    adhesion = TruncatedAdhesion(parameters, 1e-7, geometry.membranes)
+    near = Neighbors(geometry, adhesion.reach)
+    assert adhesion.energy(geometry, near) == 0
+    assert not np.any(adhesion.density(geometry, near))
+    assert not np.any(adhesion.stiffness(geometry, near))
+
+
+def test_what_serves_few_vesicles_only_is_refused() -> None:
+    integrator = Numerics(integrator="rosenbrock")
+    with pytest.raises(ValidationError, match=r"numerics\.integrator"):
+        suspension(LARGEST_DENSE + 1, numerics=integrator)
+    suspension(LARGEST_DENSE, numerics=integrator)

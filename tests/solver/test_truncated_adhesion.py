@@ -16,7 +16,8 @@ from solver.scene import Adhesion as AdhesionParameters
 from solver.scene import Numerics, Scene
 from solver.simulate import simulate
 from solver.start import placed_state
-from solver.truncated_adhesion import TruncatedAdhesion, truncated_potential
+from solver.truncated_adhesion import TruncatedAdhesion
+from solver.truncated_potential import TruncatedPotential, truncated_potential
 from tests.solver.scenes import geometry_of, shear_pair, smooth_direction, uneven_pair
 
 Array = NDArray[np.float64]
@@ -37,6 +38,10 @@ def adhesion_of(scene: Scene, accuracy: float = 1e-9) -> TruncatedAdhesion:
     return TruncatedAdhesion(scene.adhesion, accuracy, geometry_of(scene).membranes)
 
 
+def potential(exponents: tuple[int, int]) -> TruncatedPotential:
+    return TruncatedPotential(DISTANCE, *exponents, CUTOFF)
+
+
 def whole(r: float, exponents: tuple[int, int]) -> float:
     m, n = exponents
     return float((DISTANCE / r) ** m - m / n * (DISTANCE / r) ** n)
@@ -47,7 +52,7 @@ def test_the_potential_is_whole_below_the_distance_and_none_beyond_the_cutoff(
     exponents: tuple[int, int],
 ) -> None:
     def value(r: float) -> float:
-        return float(truncated_potential(r * r, DISTANCE, CUTOFF, *exponents)[0])
+        return float(truncated_potential(r * r, potential(exponents))[0])
 
     for r in (0.2, 0.39, DISTANCE):
         assert value(r) == pytest.approx(whole(r, exponents), rel=1e-14)
@@ -65,10 +70,8 @@ def test_the_potential_is_whole_below_the_distance_and_none_beyond_the_cutoff(
 def test_its_derivatives_are_exact(exponents: tuple[int, int], r: float) -> None:
     square, step = r * r, 1e-3 * r * r
     weights = np.array([1, -8, 8, -1]) / (12 * step)
-    around = np.array(
-        [truncated_potential(square + k * step, DISTANCE, CUTOFF, *exponents) for k in (-2, -1, 1, 2)]
-    )
-    _, slope, bend = truncated_potential(square, DISTANCE, CUTOFF, *exponents)
+    around = np.array([truncated_potential(square + k * step, potential(exponents)) for k in (-2, -1, 1, 2)])
+    _, slope, bend = truncated_potential(square, potential(exponents))
     scale = abs(bend) + abs(slope)
     np.testing.assert_allclose(weights @ around[:, :2], [slope, bend], rtol=0, atol=1e-6 * scale + 1e-9)
 
@@ -78,7 +81,7 @@ def test_four_derivatives_are_continuous_at_the_ends_of_the_switch(end: float) -
     """Of χ itself, the ratio to the whole potential: left of an end and right of it a constant."""
 
     def switch(r: float) -> float:
-        return float(truncated_potential(r * r, DISTANCE, CUTOFF, 4, 2)[0] / whole(r, (4, 2)))
+        return float(truncated_potential(r * r, potential((4, 2)))[0] / whole(r, (4, 2)))
 
     inside = 1 if end == DISTANCE else -1
     steps = np.array([0.02, 0.01])
