@@ -27,6 +27,7 @@ _COLLECTIVE = {"ranks": "ranks", "bytes": "gathered_bytes", "seconds": "seconds"
 _COST = {
     "vesicles": "vesicles",
     "seconds": "seconds",
+    "sums over all points": "sums",
     "peak memory (bytes)": "peak_memory_bytes",
     "seconds with fast summation (model)": "with_fast_summation",
 }
@@ -36,6 +37,7 @@ _PREDICTION = {"vesicles": "vesicles", "ranks": "ranks", "efficiency": "efficien
 def scaling_text(report: Scaling, figures: Sequence[str]) -> str:
     """Return the report, with figures in these files."""
     model, crossover = report.model, report.crossover
+    pays = f"beyond {crossover.vesicles} vesicles" if crossover.vesicles else "for no number measured"
     crowded = "  There are more ranks than cores: times say nothing, only results do." * report.oversubscribed
     sections = [
         "# Scaling",
@@ -65,8 +67,10 @@ def scaling_text(report: Scaling, figures: Sequence[str]) -> str:
         f"The most ranks, up to 10,000, on which the model is {LEAST_EFFICIENCY:.0%} efficient.",
         table({"vesicles": "vesicles", "ranks": "ranks"}, report.recommendations),
         "## Cost against the number of vesicles, and fast summation",
-        f"{crossover.assumption}  Then a point costs as much as {crossover.pairs_a_point:.0f} pairs, and "
-        f"fast summation pays beyond {crossover.points} points, {crossover.vesicles} vesicles.",
+        f"{crossover.assumption}  Then a point costs as much as {crossover.pairs_a_point:.0f} pairs of the "
+        f"direct sum, of {crossover.pair_seconds:.2g} s each here, and {crossover.point_seconds:.2g} s in an "
+        f"evaluation.  Against that, series of whole vesicles make the time above grow by {model.pair:.2g} s "
+        f"for each pair: fast summation pays {pays}.",
         table(_COST, report.costs),
     ]
     return "\n\n".join(sections) + "\n"
