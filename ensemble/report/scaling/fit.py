@@ -36,30 +36,35 @@ ASSUMPTION = (
 def model_of(
     costs: Sequence[Cost], evaluations: Sequence[Evaluation], collectives: Sequence[Collective]
 ) -> ScalingModel:
-    """Fit the constants, each measured point counting by its relative error.
+    """Fit the constants, each measured time counting by its relative error.
 
-    Latency and bandwidth are those of an earlier measurement where there is a single rank.
+    Latency and bandwidth are those of an earlier measurement where there is a single rank, and what is
+    shared then counts as repeated.
     """
-    many = [cost for cost in costs if cost.vesicles > LARGEST_DENSE]
-    points = np.array([POINTS * cost.vesicles for cost in many], dtype=float)
-    seconds = np.array([cost.seconds for cost in many])
-    terms = np.stack([points**2, points, np.ones_like(points)], axis=1)
-    pair, point, fixed = nnls(terms / seconds[:, None], np.ones_like(seconds))[0]
     shared = [found for found in evaluations if found.vesicles > LARGEST_DENSE]
-    gathers = float(np.mean([found.gathers for found in shared]))
-    bytes_a_point = float(
-        np.mean([found.gathered_bytes / found.gathers / (POINTS * found.vesicles) for found in shared])
-    )
     latency, bandwidth = _of_collectives(collectives)
-    return ScalingModel(
-        pair=pair,
-        point=point,
-        fixed=fixed,
-        gathers=gathers,
-        bytes_a_point=bytes_a_point,
+    exchanging = ScalingModel(
+        pair=0.0,
+        point=0.0,
+        repeated=0.0,
+        fixed=0.0,
+        gathers=float(np.mean([found.gathers for found in shared])),
+        bytes_a_point=float(
+            np.mean([found.gathered_bytes / found.gathers / (POINTS * found.vesicles) for found in shared])
+        ),
         latency=latency,
         bandwidth=bandwidth,
     )
+    times = [(found.vesicles, 1, found.seconds) for found in costs if found.vesicles > LARGEST_DENSE]
+    times += [(found.vesicles, found.ranks, found.seconds) for found in shared]
+    vesicles, ranks, seconds = np.array(times, dtype=float).T
+    points = POINTS * vesicles
+    exchanged = [exchanging.seconds(POINTS * of_one, on) for of_one, on, _ in times]
+    several = np.any(ranks > 1)
+    terms = np.stack([points**2 / ranks, points / ranks * several, points, np.ones_like(points)], axis=1)
+    computed = np.maximum(seconds - exchanged, 0.0)
+    pair, point, repeated, fixed = nnls(terms / seconds[:, None], computed / seconds)[0]
+    return exchanging.model_copy(update={"pair": pair, "point": point, "repeated": repeated, "fixed": fixed})
 
 
 def _of_collectives(collectives: Sequence[Collective]) -> tuple[float, float]:
@@ -109,4 +114,4 @@ def crossover(model: ScalingModel, costs: Sequence[Cost], pair_seconds: float) -
 
 def with_fast_summation(model: ScalingModel, fast: Crossover, vesicles: int) -> float:
     """Seconds of an evaluation on one rank whose sums are made by a fast multipole method."""
-    return (fast.point_seconds + model.point) * POINTS * vesicles + model.fixed
+    return (fast.point_seconds + model.point + model.repeated) * POINTS * vesicles + model.fixed

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from ensemble.report.markdown import table
 from ensemble.report.scaling.document import Scaling
-from ensemble.scaling import LEAST_EFFICIENCY
+from ensemble.scaling import LEAST_EFFICIENCY, ScalingModel
 
 _EVALUATION = {
     "vesicles": "vesicles",
@@ -45,7 +45,7 @@ def scaling_text(report: Scaling, figures: Sequence[str]) -> str:
         f"Evaluations of the right-hand side, {report.points} points on each vesicle: adhering "
         "vesicles in shear, at random places in a square of which they fill a fifth (2: the published pair, "
         "of which one is computed).  "
-        "Medians; compiling is not timed.",
+        "The least of several times each; compiling is not timed.",
         *(f"![{name}]({name})" for name in figures),
         "## Strong scaling",
         "Shares of the time are those of the first rank, profiled; waiting for others is in the collectives.",
@@ -57,9 +57,8 @@ def scaling_text(report: Scaling, figures: Sequence[str]) -> str:
         f"Allgatherv; latency {model.latency:.2g} s, bandwidth {model.bandwidth:.2g} bytes/s.",
         table(_COLLECTIVE, report.collectives),
         "## Model",
-        "t(G) = pair·P²/G + point·P + fixed + gathers·(latency·⌈log₂ G⌉ + bytes·P·(G − 1)/(G·bandwidth)) for "
-        f"P points on G ranks, with pair = {model.pair:.3g} s, point = {model.point:.3g} s, fixed = "
-        f"{model.fixed:.3g} s, gathers = {model.gathers:.3g}, bytes = {model.bytes_a_point:.3g}.  Its "
+        "t(G) = (pair·P² + point·P)/G + repeated·P + fixed + gathers·(latency·⌈log₂ G⌉ + bytes·P·(G − 1)/"
+        f"(G·bandwidth)) for P points on G ranks, with {_constants(model)}.  Its "
         f"largest deviation from a measured time is {report.largest_misprediction:.0%}.  Latency and "
         "bandwidth are those of this machine; a network's are others.",
         table(_PREDICTION, report.predictions),
@@ -74,3 +73,10 @@ def scaling_text(report: Scaling, figures: Sequence[str]) -> str:
         table(_COST, report.costs),
     ]
     return "\n\n".join(sections) + "\n"
+
+
+def _constants(model: ScalingModel) -> str:
+    """The constants of the time that is computed, and how often and how much is exchanged."""
+    seconds = {name: getattr(model, name) for name in ("pair", "point", "repeated", "fixed")}
+    each = [f"{name} = {value:.3g} s" for name, value in seconds.items()]
+    return ", ".join([*each, f"gathers = {model.gathers:.3g}", f"bytes = {model.bytes_a_point:.3g}"])
