@@ -1,10 +1,11 @@
 """How the time of one evaluation of a scene depends on the ranks that share it, and how many it is worth.
 
-An evaluation sums over all pairs of points, in rows that ranks share; every rank repeats what grows like the
-number of points (shapes, spectra, the vesicles' own parts); and for each sum the ranks gather the rows of
-all.  With P points on G ranks
+An evaluation sums over all pairs of points, in rows that ranks share, as they share what a point does to its
+own vesicle and near ones; every rank repeats the rest that grows like the number of points (shapes, search
+for neighbors); and for each sum the ranks gather the rows of all.  With P points on G ranks
 
-    t(G) = pair·P²/G + point·P + fixed + gathers·(latency·⌈log₂ G⌉ + bytes·P·(G − 1)/(G·bandwidth)),
+    t(G) = (pair·P² + point·P)/G + repeated·P + fixed
+           + gathers·(latency·⌈log₂ G⌉ + bytes·P·(G − 1)/(G·bandwidth)),
 
 the latency of a collective growing like the depth of its tree (Thakur, Rabenseifner and Gropp, Int. J. High
 Perform. Comput. Appl. 19, 49 (2005)).
@@ -32,7 +33,8 @@ class ScalingModel(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     pair: float = Field(ge=0)  # for each pair of points
-    point: float = Field(ge=0)  # for each point, on every rank
+    point: float = Field(ge=0)  # for each point
+    repeated: float = Field(ge=0)  # for each point, on every rank
     fixed: float = Field(ge=0)  # on every rank
     gathers: float = Field(ge=0)  # collectives in an evaluation
     bytes_a_point: float = Field(ge=0)  # that each of them gathers
@@ -45,7 +47,8 @@ class ScalingModel(BaseModel):
 
     def computing(self, points: float, ranks: int) -> float:
         """The part of it that a rank computes."""
-        return self.pair * points**2 / ranks + self.point * points + self.fixed
+        shared = self.pair * points**2 + self.point * points
+        return shared / ranks + self.repeated * points + self.fixed
 
     def collectives(self, points: float, ranks: int) -> float:
         """The part of it that ranks exchange what they have computed."""
@@ -72,6 +75,7 @@ class ScalingModel(BaseModel):
 MEASURED: Final = ScalingModel(
     pair=2.45e-8,
     point=0.0,
+    repeated=0.0,
     fixed=2e-3,
     gathers=10.0,
     bytes_a_point=16.0,

@@ -9,6 +9,7 @@ number of ranks a row differs by round-off only, where the rows of a matrix prod
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import prod
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
@@ -119,18 +120,18 @@ class _Division:
 
     def __init__(self, communicator: Any, bounds: NDArray[np.int64]) -> None:
         self._communicator = communicator
-        self._bounds = bounds
+        self._rows = int(bounds[-1])
+        self._starts, self._counts = bounds[:-1], np.diff(bounds)
         rank = communicator.Get_rank()
         self.own = slice(int(bounds[rank]), int(bounds[rank + 1]))
 
     def gather(self, part: Array, axis: int = 0) -> Array:
         """See `Shares`."""
-        rows = np.ascontiguousarray(np.moveaxis(part, axis, 0))
-        whole = np.empty((int(self._bounds[-1]), *rows.shape[1:]))
-        width = whole[:1].size
-        counts, starts = np.diff(self._bounds) * width, self._bounds[:-1] * width
-        self._communicator.Allgatherv(rows, [whole, (counts, starts)])
-        return np.ascontiguousarray(np.moveaxis(whole, 0, axis))
+        rows = np.ascontiguousarray(part if axis == 0 else np.moveaxis(part, axis, 0))
+        whole = np.empty((self._rows, *rows.shape[1:]))
+        width = prod(rows.shape[1:])
+        self._communicator.Allgatherv(rows, [whole, (self._counts * width, self._starts * width)])
+        return whole if axis == 0 else np.ascontiguousarray(np.moveaxis(whole, 0, axis))
 
 
 def even_bounds(cost: Array, size: int) -> NDArray[np.int64]:

@@ -7,6 +7,7 @@ NDF modification; the Jacobian is kept until Newton's iteration slows down.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -124,7 +125,6 @@ class BlockBackwardDifferentiation(BackwardDifferentiation):
         # SciPy stores and inverts I − c·J by what it is given here; it knows dense and sparse matrices only.
         bdf = BDF(jac=csc_array((len(state), len(state))), **arguments)
         first: BlockDiagonal = self._jacobian(state)
-        members = first.members
 
         def jacobian(_: float, state: Array) -> Array:
             bdf.njev += 1
@@ -138,9 +138,9 @@ class BlockBackwardDifferentiation(BackwardDifferentiation):
             return np.asarray(np.linalg.inv(blocks))
 
         def solve(inverses: Array, right: Array) -> Array:
-            return BlockDiagonal(inverses, members) @ right
+            return replace(first, blocks=inverses) @ right
 
         bdf.njev = 1
-        bdf.I, bdf.J = np.eye(members.shape[1]), first.blocks
+        bdf.I, bdf.J = np.eye(first.members.shape[1]), first.blocks
         bdf.jac, bdf.lu, bdf.solve_lu = jacobian, invert, solve
         return bdf

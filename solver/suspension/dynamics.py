@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Self
 
@@ -14,12 +15,12 @@ from solver.flow import ImposedFlow, imposed_flow
 from solver.geometry import Geometry, Membranes
 from solver.integrators.blocks import BlockDiagonal
 from solver.neighbors import Neighbors
-from solver.parallel import Parallel
+from solver.parallel import Parallel, Shares
 from solver.scene import Scene
 from solver.suspension.adhesion import SummedAdhesion
 from solver.suspension.single_layer import SummedSingleLayer
 from solver.suspension.tension import Preconditioner, SummedInextensibility
-from solver.tension import Inextensibility
+from solver.tension import Inextensibility, TensionNotFoundError
 
 Array = NDArray[np.float64]
 
@@ -71,7 +72,11 @@ class Suspension:
         neighbors = Neighbors(geometry, self.reach)
         self.layer.assemble(geometry, neighbors)
         if self._preconditioner is None:
-            self._preconditioner = self._precondition(geometry)
+            self._preconditioner = self._precondition(
+                geometry,
+                self.parallel.divide(self.membranes.count),
+                lambda alone, own, _: alone.inextensibility.factorize(alone.layer, own),
+            )
         bending = self.bending.density(geometry)
         density, adhesion = bending, None
         if self.adhesion:
@@ -107,10 +112,9 @@ class Suspension:
         shares = self.parallel.divide(count)
         own = range(count)[shares.own]
         blocks = np.empty((len(own), points + 2, points + 2))
-        inverses, shifts = np.empty((len(own), points, points)), np.empty(len(own))
-        for k, vesicle in enumerate(own):
-            alone, geometry = self._alone(motion.geometry, vesicle)
-            part = slice(vesicle, vesicle + 1)
+
+        def linearize(alone: Dynamics, geometry: Geometry, k: int) -> None:
+            part = slice(own[k], own[k] + 1)
             among_others = Motion(
                 geometry,
                 None,
@@ -121,25 +125,40 @@ class Suspension:
                 None if motion.adhesion is None else motion.adhesion[:, part],
             )
             by_state = alone.point_derivatives(geometry)
-            drawn = None if stiffness is None else _drawn(stiffness[:, vesicle], by_state)
+            drawn = None if stiffness is None else _drawn(stiffness[:, own[k]], by_state)
             carried = alone.flow.jacobian(by_state) if alone.flow else None
             blocks[k] = alone.linearized(among_others, drawn, carried)
-            inverses[k], shifts[k] = alone.inextensibility.inverse, alone.inextensibility.shift
-        self._preconditioner = Preconditioner(shares.gather(inverses), shares.gather(shifts)[:, None])
+
+        self._preconditioner = self._precondition(motion.geometry, shares, linearize)
         angles = np.arange(count * points).reshape(count, points)
         centers = count * points + np.arange(2 * count).reshape(2, count).T
-        return BlockDiagonal(shares.gather(blocks), np.concatenate([angles, centers], axis=1))
+        return BlockDiagonal(blocks, np.concatenate([angles, centers], axis=1), shares)
 
-    def _precondition(self, geometry: Geometry) -> Preconditioner:
-        """A preconditioner for the tension before there is a Jacobian."""
+    def _precondition(
+        self, geometry: Geometry, shares: Shares, factorize: Callable[[Dynamics, Geometry, int], object]
+    ) -> Preconditioner:
+        """The preconditioner for the tension, after this rank's vesicles have been factorized one by one.
+
+        Collective, and so is a failure: where one rank's has one, all raise it.
+        """
         count, points = self.membranes.count, self.membranes.points
-        shares = self.parallel.divide(count)
         own = range(count)[shares.own]
-        inverses, shifts = np.empty((len(own), points, points)), np.empty(len(own))
+        inverses, shifts, failed = (
+            np.empty((len(own), points, points)),
+            np.empty(len(own)),
+            np.zeros(len(own)),
+        )
         for k, vesicle in enumerate(own):
             alone, its_geometry = self._alone(geometry, vesicle)
-            alone.inextensibility.factorize(alone.layer, its_geometry)
+            try:
+                factorize(alone, its_geometry, k)
+            except TensionNotFoundError:
+                failed[k] = 1.0
+                continue
             inverses[k], shifts[k] = alone.inextensibility.inverse, alone.inextensibility.shift
+        if (everywhere := shares.gather(failed)).any():
+            vesicle = int(np.argmax(everywhere))
+            raise TensionNotFoundError(f"the tension could not be found: vesicle {vesicle} is too distorted")
         return Preconditioner(shares.gather(inverses), shares.gather(shifts)[:, None])
 
     def _alone(self, geometry: Geometry, vesicle: int) -> tuple[Dynamics, Geometry]:

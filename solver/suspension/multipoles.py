@@ -16,24 +16,13 @@ from numpy.typing import NDArray
 
 from solver.compilation import compiled
 from solver.direct_sum import velocity as direct_velocity
-from solver.geometry import Geometry
 from solver.logarithm import logarithm
 
 Array = NDArray[np.float64]
 Orders = NDArray[np.int64]
-Powers = NDArray[np.complex128]
 
 # Terms up to which the series serve; measured: one costs about as much as the sum over one point.
 LARGEST_ORDER = 32
-
-
-def powers_of(geometry: Geometry, vesicles: slice) -> Powers:
-    """The tᵏ of some vesicles, (m, p, N)."""
-    x, y = geometry.points[:, vesicles] - geometry.centers[:, vesicles, None]
-    powers = np.empty((x.shape[0], LARGEST_ORDER, x.shape[1]), dtype=complex)
-    powers[:, 0] = 1.0
-    powers[:, 1:] = (x + 1j * y)[:, None]
-    return np.multiply.accumulate(powers, axis=1, out=powers)
 
 
 @compiled
@@ -60,25 +49,51 @@ def orders_between(points: Array, centers: Array, accuracy: float, out: Orders) 
             out[target, source] = max(2, int(np.ceil(needed / decay))) if serves else 0
 
 
-def coefficients_of(powers: Powers, point_forces: Array) -> Array:
-    """Coefficients (m, 6, p + 1) of the three series, real and imaginary, for point forces (2, m, N).
+@compiled
+def write_coefficients(points: Array, centers: Array, first: int, point_forces: Array, out: Array) -> None:
+    """Write the coefficients of the series of m vesicles from ``first`` on, (m, 6, p + 1).
 
-    In order: of the series whose conjugate counts, of that which counts as it is, of that which counts times
-    z.  The first one's coefficient of w⁰ is the whole force instead.
+    points : (2, M, N); point_forces : (2, m, N)
+
+    Real and imaginary parts, in order of the series whose conjugate counts, of that which counts as it is,
+    and of that which counts times z.  The first one's coefficient of w⁰ is the whole force instead.
     """
-    force = point_forces[0] + 1j * point_forces[1]
-    t = powers[:, 1]
-    moments = powers @ np.stack([force, force.conj(), t.conj() * force], axis=-1)
-    along, opposite, turned = moments[:, :, 0], moments[:, :, 1].conj(), moments[:, :, 2].conj()
-    index = np.arange(1, powers.shape[1])
-    coefficients = np.zeros((3, powers.shape[0], powers.shape[1] + 1), dtype=complex)
-    coefficients[0, :, 1:-1] = along[:, 1:].conj() / (2 * index)
-    coefficients[1, :, 1:-1] = opposite[:, 1:] / (2 * index)
-    coefficients[1, :, 1:] -= 0.5 * turned
-    coefficients[2, :, 1:] = 0.5 * along.conj()
-    coefficients[0, :, 0] = along[:, 0]  # not of the series: the whole force
-    parts = np.stack([coefficients.real, coefficients.imag], axis=1)  # (3, 2, M, p + 1)
-    return np.ascontiguousarray(parts.reshape(6, *coefficients.shape[1:]).swapaxes(0, 1))
+    n, last = points.shape[2], out.shape[2] - 1
+    tx, ty, turned_x, turned_y, power_x, power_y = np.empty((6, n))
+    for row in range(out.shape[0]):
+        force_x, force_y = point_forces[0, row], point_forces[1, row]
+        for i in range(n):
+            tx[i] = points[0, first + row, i] - centers[0, first + row]
+            ty[i] = points[1, first + row, i] - centers[1, first + row]
+            turned_x[i] = tx[i] * force_x[i] + ty[i] * force_y[i]  # t f̄
+            turned_y[i] = ty[i] * force_x[i] - tx[i] * force_y[i]
+            power_x[i] = 1.0
+            power_y[i] = 0.0
+        series = out[row]
+        series[:2, last] = 0.0
+        series[2:, 0] = 0.0
+        for k in range(last):
+            xx = xy = yx = yy = 0.0
+            turned_along = turned_across = 0.0
+            for i in range(n):
+                xx += force_x[i] * power_x[i]
+                yy += force_y[i] * power_y[i]
+                xy += force_x[i] * power_y[i]
+                yx += force_y[i] * power_x[i]
+                turned_along += turned_x[i] * power_x[i] + turned_y[i] * power_y[i]
+                turned_across += turned_y[i] * power_x[i] - turned_x[i] * power_y[i]
+                grown = power_x[i] * tx[i] - power_y[i] * ty[i]
+                power_y[i] = power_x[i] * ty[i] + power_y[i] * tx[i]
+                power_x[i] = grown
+            # Σ f tᵏ = (xx − yy) + i (xy + yx) and Σ f t̄ᵏ = (xx + yy) + i (yx − xy)
+            if k == 0:
+                series[0, 0], series[1, 0] = xx - yy, xy + yx
+            else:
+                series[0, k], series[1, k] = (xx - yy) / (2 * k), -(xy + yx) / (2 * k)
+                series[2, k] += (xx + yy) / (2 * k)
+                series[3, k] += (yx - xy) / (2 * k)
+            series[2, k + 1], series[3, k + 1] = -0.5 * turned_along, -0.5 * turned_across
+            series[4, k + 1], series[5, k + 1] = 0.5 * (xx - yy), -0.5 * (xy + yx)
 
 
 @compiled
@@ -140,7 +155,7 @@ def velocity(
     first: int,
     result: Array,
 ) -> None:
-    """Write the velocity (2, m, N) of m vesicles from ``first`` on: by series, or directly where none serves.
+    """Add the velocity (2, m, N) of m vesicles from ``first`` on: by series, or directly where none serves.
 
     points : (2, M, N); point_forces, coefficients : (M, 2, N) and (M, 6, ·); orders : (m, M)
     """
@@ -166,4 +181,4 @@ def velocity(
                 add_series(
                     targets, centers[0, source], centers[1, source], coefficients[source], order, work, part
                 )
-        result[:, row] = part
+        result[:, row] += part

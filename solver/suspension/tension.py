@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.compilation import compiled
 from solver.geometry import Geometry
 from solver.spectral import differentiation
 from solver.suspension.single_layer import SummedSingleLayer
@@ -31,6 +32,19 @@ class Preconditioner(NamedTuple):
 
     inverses: Array
     shifts: Array
+
+
+@compiled
+def _image(tangents: Array, shifts: Array, tension: Array, gradient: Array) -> Array:
+    """The mean of each tension (m, N) times its shift, minus the stretching in its velocity gradient."""
+    image = np.empty_like(tension)
+    for vesicle in range(tension.shape[0]):
+        shift = shifts[vesicle, 0] * tension[vesicle].mean()
+        for i in range(tension.shape[1]):
+            stretching = tangents[0, vesicle, i] * gradient[0, vesicle, i]
+            stretching += tangents[1, vesicle, i] * gradient[1, vesicle, i]
+            image[vesicle, i] = shift - stretching
+    return image
 
 
 class SummedInextensibility:
@@ -75,41 +89,42 @@ class SummedInextensibility:
         def pull(tension: Array) -> Array:
             return np.asarray((tension * tangents) @ derivative)
 
-        def along(vectors: Array) -> Array:
-            return np.asarray(tangents[0] * vectors[0] + tangents[1] * vectors[1])
-
         def precondition(residual: Array) -> Array:
             return np.asarray((inverses @ residual[:, :, None])[:, :, 0])
 
-        def total(*fields: Array) -> Array:
-            """Sums of fields (m, N) over all points of all vesicles."""
-            return shares.gather(np.stack([field.sum(axis=1) for field in fields], axis=1)).sum(axis=0)
+        def total(*pairs: tuple[Array, Array]) -> Array:
+            """Products of fields (m, N), summed over all points of all vesicles."""
+            sums = [np.einsum("ij,ij->i", first, second) for first, second in pairs]
+            return shares.gather(np.stack(sums, axis=1)).sum(axis=0)
 
         tension = np.zeros(tangents.shape[1:]) if self._last is None else self._last[own].copy()
         velocity = layer.velocity(density[:, own] * spacing + pull(tension))
         if flow is not None:
             velocity += flow[:, own]
         gradient = velocity @ derivative
-        residual = along(gradient) - shifts * tension.mean(axis=1, keepdims=True)
+        residual = -_image(tangents, shifts, tension, gradient)
         direction = precondition(residual)
-        strain, square, product = total(
-            np.sum(gradient * gradient, axis=0), residual * residual, residual * direction
+        strain_x, strain_y, square, product = total(
+            (gradient[0], gradient[0]),
+            (gradient[1], gradient[1]),
+            (residual, residual),
+            (residual, direction),
         )
         natural = membranes.natural_rate**2 * membranes.points * np.sum(membranes.spacing**2)
-        goal = self.tolerance**2 * max(strain, natural)
+        goal = self.tolerance**2 * max(strain_x + strain_y, natural)
         for _ in range(_LIMIT):
             if square <= goal:
                 break
             self.iterations += 1
             change = layer.velocity(pull(direction))
-            image = shifts * direction.mean(axis=1, keepdims=True) - along(change @ derivative)
-            step = product / total(direction * image)[0]
+            image = _image(tangents, shifts, direction, change @ derivative)
+            step = product / total((direction, image))[0]
             tension += step * direction
             velocity += step * change
             residual -= step * image
             correction = precondition(residual)
             previous = product
-            square, product = total(residual * residual, residual * correction)
+            square, product = total((residual, residual), (residual, correction))
             direction = correction + (product / previous) * direction
         else:
             raise TensionNotFoundError("the tension could not be found: the membranes are too distorted")

@@ -21,7 +21,14 @@ from ensemble.study import load_scene
 from solver.parallel import SERIAL
 
 KNOWN = ScalingModel(
-    pair=3e-8, point=4e-6, fixed=2e-4, gathers=6.0, bytes_a_point=16.0, latency=1e-5, bandwidth=1e9
+    pair=3e-8,
+    point=5e-6,
+    repeated=4e-6,
+    fixed=2e-4,
+    gathers=6.0,
+    bytes_a_point=16.0,
+    latency=1e-5,
+    bandwidth=1e9,
 )
 
 
@@ -29,7 +36,7 @@ def test_one_rank_exchanges_nothing_and_is_efficient():
     for points in (64, 10_000):
         assert KNOWN.collectives(points, 1) == 0
         assert KNOWN.efficiency(points, 1) == 1
-        assert KNOWN.seconds(points, 1) == pytest.approx(3e-8 * points**2 + 4e-6 * points + 2e-4)
+        assert KNOWN.seconds(points, 1) == pytest.approx(3e-8 * points**2 + 9e-6 * points + 2e-4)
 
 
 def test_an_evaluation_takes_at_least_what_every_rank_repeats_and_exchanges():
@@ -52,16 +59,19 @@ def evaluation(vesicles: int, ranks: int, **fields: float) -> Evaluation:
     return Evaluation(vesicles=vesicles, ranks=ranks, **values | fields)
 
 
+COSTS = [
+    Cost(
+        vesicles=vesicles,
+        seconds=KNOWN.seconds(POINTS * vesicles, 1),
+        sums=8.0,
+        peak_memory_bytes=1,
+        with_fast_summation=None,
+    )
+    for vesicles in (8, 16, 32, 64, 128)
+]
+
+
 def test_a_model_is_recovered_from_its_own_times():
-    costs = [
-        Cost(
-            vesicles=vesicles,
-            seconds=KNOWN.seconds(POINTS * vesicles, 1),
-            peak_memory_bytes=1,
-            with_fast_summation=None,
-        )
-        for vesicles in (8, 16, 32, 64, 128)
-    ]
     collectives = [
         Collective(
             ranks=ranks,
@@ -71,7 +81,7 @@ def test_a_model_is_recovered_from_its_own_times():
         for ranks in (2, 4)
         for size in (16, 1024, 10**6)
     ]
-    model = model_of(costs, [evaluation(16, 2), evaluation(64, 2)], collectives)
+    model = model_of(COSTS, [evaluation(16, 2), evaluation(64, 2)], collectives)
     for name, value in KNOWN.model_dump().items():
         assert getattr(model, name) == pytest.approx(value, rel=1e-6), name
 
@@ -86,11 +96,11 @@ def test_the_recommendation_is_the_last_efficient_number_of_ranks():
 
 
 def test_fast_summation_pays_beyond_the_crossover():
-    found = crossover()
+    found = crossover(KNOWN, COSTS, pair_seconds=2e-9)
     assert found.pairs_a_point == pytest.approx(3 * 2 * 9 * math.sqrt(3) * found.terms)
-    below, above = found.vesicles // 2, 2 * found.vesicles
-    assert with_fast_summation(KNOWN, below) > KNOWN.seconds(POINTS * below, 1)
-    assert with_fast_summation(KNOWN, above) < KNOWN.seconds(POINTS * above, 1)
+    assert found.point_seconds == pytest.approx(8 * 2e-9 * found.pairs_a_point)
+    for vesicles, pays in ((found.vesicles // 2, False), (2 * found.vesicles, True)):
+        assert (with_fast_summation(KNOWN, found, vesicles) < KNOWN.seconds(POINTS * vesicles, 1)) is pays
 
 
 def test_what_is_gathered_is_counted():
@@ -164,6 +174,8 @@ def test_evaluations_are_measured_on_real_ranks_and_written(launcher, tmp_path):
         assert (tmp_path / f"{name}.png").read_bytes().startswith(b"\x89PNG")
     text = scaling_text(report, ["cost.png"])
     assert "![cost.png](cost.png)" in text
-    assert f"{report.crossover.vesicles} vesicles" in text
+    assert f"{report.crossover.pairs_a_point:.0f} pairs of the direct sum" in text
+    assert report.crossover.pair_seconds > 0
+    assert all(cost.sums > 1 for cost in report.costs[1:])
     for point in report.evaluations:
         assert f"{point.seconds:.4g}" in text

@@ -21,7 +21,7 @@ from ensemble.report.scaling.fit import (
     recommendations,
     with_fast_summation,
 )
-from ensemble.report.scaling.measure import Measured, collectives, evaluation, peak_memory
+from ensemble.report.scaling.measure import Measured, collectives, evaluation, pair_seconds, peak_memory
 from ensemble.report.scaling.plan import FULL, POINTS, QUICK, Plan
 from ensemble.report.scaling.text import scaling_text
 from ensemble.scaling import ScalingModel
@@ -78,6 +78,7 @@ def measured(communicator: Intracomm, plan: Plan, tell: Tell) -> Scaling | None:
         return None
     model = model_of(costs, evaluations, gathered)
     evaluations = [_predicted(model, found) for found in evaluations]
+    fast = crossover(model, costs, pair_seconds())
     return Scaling(
         machine=Machine.here(),
         ranks=communicator.Get_size(),
@@ -93,10 +94,10 @@ def measured(communicator: Intracomm, plan: Plan, tell: Tell) -> Scaling | None:
         predictions=predictions(model),
         recommendations=recommendations(model),
         costs=[
-            cost.model_copy(update={"with_fast_summation": with_fast_summation(model, cost.vesicles)})
+            cost.model_copy(update={"with_fast_summation": with_fast_summation(model, fast, cost.vesicles)})
             for cost in costs
         ],
-        crossover=crossover(),
+        crossover=fast,
     )
 
 
@@ -119,6 +120,7 @@ def _costs(communicator: Intracomm, plan: Plan, say: Tell) -> list[Cost]:
                 Cost(
                     vesicles=vesicles,
                     seconds=one.seconds,
+                    sums=one.sums,
                     peak_memory_bytes=peak_memory(),
                     with_fast_summation=None,
                 )

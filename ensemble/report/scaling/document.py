@@ -50,10 +50,14 @@ class Collective(Document):
 
 
 class Cost(Document):
-    """What an evaluation costs one rank; memory is the largest that the process has had by then."""
+    """What an evaluation costs one rank; memory is the largest that the process has had by then.
+
+    sums : velocities of all points by all points in it.
+    """
 
     vesicles: int
     seconds: float
+    sums: float
     peak_memory_bytes: int
     with_fast_summation: float | None  # seconds, predicted
 
@@ -74,15 +78,19 @@ class Recommendation(Document):
 
 
 class Crossover(Document):
-    """From where on a fast multipole method would sum faster than pair by pair.
+    """From where on a fast multipole method would sum faster than series of vesicles and their near points.
 
     pairs_a_point : what it costs for each point, in pairs of the direct sum.
+    pair_seconds : of a pair of the direct sum.
+    point_seconds : of all its sums in an evaluation, for each point.
+    vesicles : None where the measured times do not grow like the pairs.
     """
 
     terms: int
     pairs_a_point: float
-    points: int
-    vesicles: int
+    pair_seconds: float
+    point_seconds: float
+    vesicles: int | None
     assumption: str
 
 

@@ -23,43 +23,48 @@ from solver.scene import LARGEST_DENSE
 _RANKS = (10, 32, 100, 316, 1_000, 3_162, 10_000)
 _VESICLES = (2, 16, 64, 256, 1_024, 10_000)
 
-_TERMS = 30  # of an expansion, for about nine digits: an error like 2^−p
+_TERMS = 24  # of an expansion: an error like 2^−p of 1e-7, as sums have at the default tolerance
 _SUMS = 3  # of a harmonic potential each, that make a Stokeslet's velocity
 ASSUMPTION = (
     "Greengard and Rokhlin, J. Comput. Phys. 73, 325 (1987): with s points in a box and p terms, each point "
     "sums over 9s neighbors, and its box's share of 27 translations costs 27p²/s; s = √3·p is best.  "
     f"Assumed: p = {_TERMS} (an error of about 2^−p), {_SUMS} harmonic sums for a Stokeslet's velocity, and "
-    "a multiplication of a translation as dear as a pair of the direct sum."
+    "a multiplication of a translation as dear as a pair of the direct sum, and adhesion summed as fast."
 )
 
 
 def model_of(
     costs: Sequence[Cost], evaluations: Sequence[Evaluation], collectives: Sequence[Collective]
 ) -> ScalingModel:
-    """Fit the constants, each measured point counting by its relative error.
+    """Fit the constants, each measured time counting by its relative error.
 
-    Latency and bandwidth are those of an earlier measurement where there is a single rank.
+    Latency and bandwidth are those of an earlier measurement where there is a single rank, and what is
+    shared then counts as repeated.
     """
-    many = [cost for cost in costs if cost.vesicles > LARGEST_DENSE]
-    points = np.array([POINTS * cost.vesicles for cost in many], dtype=float)
-    seconds = np.array([cost.seconds for cost in many])
-    terms = np.stack([points**2, points, np.ones_like(points)], axis=1)
-    pair, point, fixed = nnls(terms / seconds[:, None], np.ones_like(seconds))[0]
     shared = [found for found in evaluations if found.vesicles > LARGEST_DENSE]
-    gathers = float(np.mean([found.gathers for found in shared]))
-    bytes_a_point = float(
-        np.mean([found.gathered_bytes / found.gathers / (POINTS * found.vesicles) for found in shared])
-    )
     latency, bandwidth = _of_collectives(collectives)
-    return ScalingModel(
-        pair=pair,
-        point=point,
-        fixed=fixed,
-        gathers=gathers,
-        bytes_a_point=bytes_a_point,
+    exchanging = ScalingModel(
+        pair=0.0,
+        point=0.0,
+        repeated=0.0,
+        fixed=0.0,
+        gathers=float(np.mean([found.gathers for found in shared])),
+        bytes_a_point=float(
+            np.mean([found.gathered_bytes / found.gathers / (POINTS * found.vesicles) for found in shared])
+        ),
         latency=latency,
         bandwidth=bandwidth,
     )
+    times = [(found.vesicles, 1, found.seconds) for found in costs if found.vesicles > LARGEST_DENSE]
+    times += [(found.vesicles, found.ranks, found.seconds) for found in shared]
+    vesicles, ranks, seconds = np.array(times, dtype=float).T
+    points = POINTS * vesicles
+    exchanged = [exchanging.seconds(POINTS * of_one, on) for of_one, on, _ in times]
+    several = np.any(ranks > 1)
+    terms = np.stack([points**2 / ranks, points / ranks * several, points, np.ones_like(points)], axis=1)
+    computed = np.maximum(seconds - exchanged, 0.0)
+    pair, point, repeated, fixed = nnls(terms / seconds[:, None], computed / seconds)[0]
+    return exchanging.model_copy(update={"pair": pair, "point": point, "repeated": repeated, "fixed": fixed})
 
 
 def _of_collectives(collectives: Sequence[Collective]) -> tuple[float, float]:
@@ -91,20 +96,22 @@ def recommendations(model: ScalingModel) -> list[Recommendation]:
     ]
 
 
-def crossover() -> Crossover:
+def crossover(model: ScalingModel, costs: Sequence[Cost], pair_seconds: float) -> Crossover:
     """Where a fast multipole method begins to pay; `ASSUMPTION` says of what cost."""
     in_a_box = math.sqrt(3) * _TERMS
     pairs = _SUMS * (9 * in_a_box + 27 * _TERMS**2 / in_a_box)
+    sums = float(np.mean([cost.sums for cost in costs if cost.vesicles > LARGEST_DENSE]))
+    point_seconds = sums * pairs * pair_seconds
     return Crossover(
         terms=_TERMS,
         pairs_a_point=pairs,
-        points=math.ceil(pairs),
-        vesicles=math.ceil(pairs / POINTS),
+        pair_seconds=pair_seconds,
+        point_seconds=point_seconds,
+        vesicles=math.ceil(point_seconds / model.pair / POINTS) if model.pair > 0 else None,
         assumption=ASSUMPTION,
     )
 
 
-def with_fast_summation(model: ScalingModel, vesicles: int) -> float:
+def with_fast_summation(model: ScalingModel, fast: Crossover, vesicles: int) -> float:
     """Seconds of an evaluation on one rank whose sums are made by a fast multipole method."""
-    points = POINTS * vesicles
-    return model.pair * points * crossover().pairs_a_point + model.point * points + model.fixed
+    return (fast.point_seconds + model.point + model.repeated) * POINTS * vesicles + model.fixed

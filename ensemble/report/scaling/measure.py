@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import resource
-import statistics
 import sys
 import time
 from typing import TYPE_CHECKING, NamedTuple
@@ -15,6 +14,7 @@ from ensemble.report.scaling.counting import Counted
 from ensemble.report.scaling.document import Collective
 from ensemble.report.scaling.plan import suspension
 from ensemble.report.scaling.profile import shares_of_time
+from solver.direct_sum import velocity
 from solver.equation import equation_of_motion
 from solver.parallel import SERIAL, Array, Ranks
 from solver.start import placed_state
@@ -26,6 +26,8 @@ _TIME_BETWEEN_STATES = 0.02  # by which the flow has moved the centers
 _SIZES = tuple(8 * 8**power for power in range(7))  # bytes on each rank, 8 to 2 million
 _MANY = 200  # collectives of the smallest size in one measurement
 _MEBIBYTE = 1 << 20
+_POINTS = 1024  # of the direct sum that is timed
+_MEASUREMENTS = 20
 
 
 class Measured(NamedTuple):
@@ -35,6 +37,7 @@ class Measured(NamedTuple):
     shares: dict[str, float]
     gathers: float
     gathered_bytes: float
+    sums: float
     rate: Array
 
 
@@ -66,6 +69,7 @@ def _evaluation(group: Intracomm, vesicles: int, repeats: int) -> Measured:
     states = (state + _TIME_BETWEEN_STATES * number * shear for number in range(1, repeats + 3))
     dynamics.rate(next(states))
     parallel.reset()
+    iterations = dynamics.inextensibility.iterations
     seconds = []
     for _ in range(repeats):
         moved = next(states)
@@ -74,9 +78,11 @@ def _evaluation(group: Intracomm, vesicles: int, repeats: int) -> Measured:
         dynamics.rate(moved)
         seconds.append(time.perf_counter() - begun)
     gathers, gathered = parallel.gathers / repeats, parallel.gathered_bytes / repeats
+    # Of the forces without tension, and in each iteration.
+    sums = 1 + (dynamics.inextensibility.iterations - iterations) / repeats
     moved = next(states)
     shares = shares_of_time(lambda: dynamics.rate(moved))
-    return Measured(statistics.median(seconds), shares, gathers, gathered, rate)
+    return Measured(min(seconds), shares, gathers, gathered, sums, rate)
 
 
 def collectives(communicator: Intracomm, ranks: int) -> list[Collective]:
@@ -106,6 +112,19 @@ def _gathering(group: Intracomm, size: int) -> float:
     for _ in range(times):
         group.Allgatherv(part, [whole, counts])
     return (time.perf_counter() - begun) / times
+
+
+def pair_seconds() -> float:
+    """Time of a pair of points in the direct sum, the least of several measurements."""
+    random = np.random.default_rng(0)
+    targets, sources, forces = random.standard_normal((3, 2, _POINTS))
+    velocity(targets, sources, forces)
+    seconds = []
+    for _ in range(_MEASUREMENTS):
+        begun = time.perf_counter()
+        velocity(targets, sources, forces)
+        seconds.append(time.perf_counter() - begun)
+    return min(seconds) / _POINTS**2
 
 
 def peak_memory() -> int:

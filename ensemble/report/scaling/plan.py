@@ -25,8 +25,8 @@ class Plan:
     repeats: int
 
 
-QUICK = Plan(shared=(2, 16, 64), alone=(2, 8, 16, 32, 64, 128), weak=32, repeats=3)
-FULL = Plan(shared=(2, 16, 64, 256), alone=(2, 8, 16, 32, 64, 128, 256, 512, 1024), weak=64, repeats=5)
+QUICK = Plan(shared=(2, 16, 64), alone=(2, 8, 16, 32, 64, 128), weak=32, repeats=6)
+FULL = Plan(shared=(2, 16, 64, 256), alone=(2, 8, 16, 32, 64, 128, 256, 512, 1024), weak=64, repeats=12)
 
 
 def suspension(vesicles: int) -> Scene:
