@@ -8,9 +8,12 @@ from __future__ import annotations
 import math
 from typing import Any
 
-MOST_VESICLES = 32
+from pydantic import TypeAdapter, ValidationError
+
+MOST_VESICLES = 256
 MOST_VESICLES_SWEPT = 4
 MOST_SWEEP_VALUES = 64
+NUMBER = TypeAdapter(int)
 
 
 def limit_scene(document: Any) -> None:
@@ -48,10 +51,17 @@ def _arranged_at_most(count: int, document: Any, *path: str) -> None:
     found = _found(document, path)
     if not isinstance(found, dict):
         return
-    numbers = [found.get(name) for name in ("count", "columns", "rows")]
-    asked = math.prod(number for number in numbers if isinstance(number, int))
+    asked = math.prod(_number(found[name]) for name in ("count", "columns", "rows") if name in found)
     if asked > count:
         raise ValueError(f"{'.'.join(path)}: {asked} vesicles — must be at most {count}")
+
+
+def _number(value: Any) -> int:
+    """Read a number as the model does, to which "40" and 40.0 are 40; what is none, it refuses by itself."""
+    try:
+        return NUMBER.validate_python(value)
+    except ValidationError:
+        return 1
 
 
 def _found(document: Any, path: tuple[str, ...]) -> Any:

@@ -199,19 +199,24 @@ def describe(problems: Sequence[ErrorDetails], document: Mapping[str, Any]) -> s
     """Say on one line what pydantic found wrong with a document, as `explain` does."""
     # Refused elements make pydantic complain about the array around them, too: that is no news.
     around = {problem["loc"][:depth] for problem in problems for depth in range(len(problem["loc"]))}
-    return "; ".join(_line(problem, document) for problem in problems if problem["loc"] not in around)
+    # What is said several times about one value are the alternatives that it could be.
+    messages: dict[str, list[str]] = {}
+    for problem in problems:
+        if problem["loc"] not in around:
+            message = problem["msg"].removeprefix("Value error, ")
+            said = messages.setdefault(_subject(problem, document), [])
+            said.append(message[:1].lower() + message[1:])
+    return "; ".join(subject + ", or ".join(said) for subject, said in messages.items())
 
 
-def _line(problem: ErrorDetails, document: Mapping[str, Any]) -> str:
-    message = problem["msg"].removeprefix("Value error, ")
-    parts = [message[:1].lower() + message[1:]]
+def _subject(problem: ErrorDetails, document: Mapping[str, Any]) -> str:
+    """What a message is about: a field, and its value."""
+    location = _without_tags(problem["loc"], document)
+    subject = f"{dotted(location)}: " if location else ""
     # For a missing field, or a check on several, the input is the table around it: no value to show.
     if not isinstance(problem["input"], Mapping) and problem["type"] != "missing":
-        parts.insert(0, f"{reprlib.repr(problem['input'])} — ")
-    location = _without_tags(problem["loc"], document)
-    if location:
-        parts.insert(0, f"{dotted(location)}: ")
-    return "".join(parts)
+        subject += f"{reprlib.repr(problem['input'])} — "
+    return subject
 
 
 def _without_tags(location: Location, document: Mapping[str, Any]) -> Location:

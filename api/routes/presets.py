@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from fastapi import APIRouter
+from pydantic import TypeAdapter
 
 from api.auth import Reader
 from api.cost import estimate
 from api.job import preset_work
 from api.schemas import Page, Preset
-from ensemble.study import preset_names
+from ensemble.study import preset_document, preset_names
+from solver.arrangement import Arrangement
 
 router = APIRouter(prefix="/presets", tags=["presets"])
 
@@ -23,6 +25,12 @@ def list_presets(reader: Reader) -> Page[Preset]:
 
 def _preset(name: str, maximum_cost: float) -> Preset:
     work = preset_work(name, {})
-    return Preset(
-        name=name, kind=work.kind, document=work.document, estimate=estimate(work.model, maximum_cost)
-    )
+    document = work.document
+    arrangement = preset_document(name).get("arrangement")
+    if arrangement is not None:  # a few lines that one may change, instead of the vesicles that come of them
+        in_full = TypeAdapter(Arrangement).dump_python(
+            TypeAdapter(Arrangement).validate_python(arrangement), mode="json", exclude_none=True
+        )
+        document = {key: value for key, value in document.items() if key != "vesicles"}
+        document["arrangement"] = in_full
+    return Preset(name=name, kind=work.kind, document=document, estimate=estimate(work.model, maximum_cost))

@@ -18,6 +18,7 @@ import { describe, quantity, valueAt } from "./symbols.js";
 
 const SECONDS_BETWEEN_LOOKS = 0.5;
 const SEARCHING = "searching";
+const CONVERGED = "converged";
 
 /**
  * Show a boundary, and go on showing how it changes.
@@ -105,11 +106,10 @@ class BoundaryView {
    */
   show(boundary, marks) {
     const { scene, sweep, search } = boundary.study;
-    const searching = boundary.points.filter((point) => point.status === SEARCHING).length;
-    const state = searching ? `tracing, ${searching} of ${boundary.points.length} open` : "complete";
+    const state = stateOfAll(boundary.points);
     this.heading.replaceChildren(
       element("h1", {}, titleOf(boundary)),
-      element("span", { class: `state ${searching ? "live" : "done"}`, role: "status" }, state),
+      element("span", { class: `state ${state.name}`, role: "status" }, state.text),
       element("p", {}, `${words(boundary.name)}: ${describe(scene, [sweep.parameter, search.parameter])}`),
     );
     this.figure.setAttribute("aria-label", summary(boundary, marks));
@@ -140,7 +140,7 @@ class BoundaryView {
 
   /** @param {Boundary} boundary */
   #offerReading(boundary) {
-    const converged = boundary.points.filter((point) => point.status === "converged");
+    const converged = boundary.points.filter((point) => point.status === CONVERGED);
     if (this.reading.hasChildNodes() || converged.length < 2) {
       return;
     }
@@ -184,8 +184,20 @@ function pointsTable(boundary) {
 
 /** @param {Point} point */
 function stateOf({ status }) {
-  const states = /** @type {Record<string, string>} */ ({ [SEARCHING]: "live", converged: "done" });
+  const states = /** @type {Record<string, string>} */ ({ [SEARCHING]: "live", [CONVERGED]: "done" });
   return states[status] ?? "bad";
+}
+
+/** @param {Point[]} points */
+function stateOfAll(points) {
+  const count = (/** @type {string} */ status) => points.filter((point) => point.status === status).length;
+  const [searching, converged] = [count(SEARCHING), count(CONVERGED)];
+  if (searching > 0) {
+    return { name: "live", text: `tracing, ${searching} of ${points.length} open` };
+  }
+  return converged === points.length
+    ? { name: "done", text: "complete" }
+    : { name: "bad", text: `${converged} of ${points.length} converged` };
 }
 
 /**

@@ -14,33 +14,54 @@ import { getNumbers } from "./api.js";
  */
 
 const ROWS = /** @type {const} */ (["x", "y", "tension"]);
+const NUMBERS_AT_ONCE = 500_000; // in an answer: half of what the service gives
 
 /** Recorded states in the order of time, without those that are not finite, as a failed run may end with. */
 export class Frames {
+  /** @type {State[]} */
+  states = [];
+
   /**
-   * @param {Float32Array} numbers - For each frame its time, then for each vesicle x, y and tension of all points.
    * @param {number} vesicles
    * @param {number} points - On each vesicle.
    */
-  constructor(numbers, vesicles, points) {
-    const size = 1 + 3 * vesicles * points;
-    const starts = Array.from({ length: numbers.length / size }, (_, index) => index * size);
-    /** @type {State[]} */
-    this.states = starts
-      .map((start) => numbers.subarray(start, start + size))
-      .filter((frame) => frame.every(Number.isFinite))
-      .map((frame) => stateOf(frame, vesicles, points));
+  constructor(vesicles, points) {
+    this.vesicles = vesicles;
+    this.points = points;
+  }
+
+  /** Numbers in a frame. */
+  get size() {
+    return 1 + 3 * this.vesicles * this.points;
+  }
+
+  /** @param {Float32Array} numbers - For each frame its time, then for each vesicle x, y and tension of all points. */
+  add(numbers) {
+    for (let start = 0; start < numbers.length; start += this.size) {
+      const frame = numbers.subarray(start, start + this.size);
+      if (frame.every(Number.isFinite)) {
+        this.states.push(stateOf(frame, this.vesicles, this.points));
+      }
+    }
   }
 
   /**
-   * Ask for all frames of a run.
+   * Ask for all frames of a run, some at a time.
    *
    * @param {any} run - Its summary.
    * @param {AbortSignal} signal
+   * @param {number} [numbersAtOnce]
    */
-  static async of({ key, scene, work }, signal) {
-    const numbers = await getNumbers(`/runs/${key}/frames`, signal);
-    return new Frames(numbers, scene.vesicles.length, work.points);
+  static async of({ key, scene, work }, signal, numbersAtOnce = NUMBERS_AT_ONCE) {
+    const frames = new Frames(scene.vesicles.length, work.points);
+    const framesAtOnce = Math.max(Math.floor(numbersAtOnce / frames.size), 1);
+    for (let start = 0, isLast = false; !isLast; start += framesAtOnce) {
+      const range = new URLSearchParams({ start: String(start), stop: String(start + framesAtOnce) });
+      const numbers = await getNumbers(`/runs/${key}/frames?${range}`, signal);
+      frames.add(numbers);
+      isLast = numbers.length < framesAtOnce * frames.size;
+    }
+    return frames;
   }
 
   /** Time of the last frame. */

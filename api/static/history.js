@@ -21,6 +21,7 @@ import { color } from "./theme.js";
 
 const ANGLE_STEPS = [1, 2, 5, 10, 15, 30, 45, 90, 180, 360, 720]; // degrees between ticks
 const MOST_TICKS = 5;
+const LEAST_ANGLE_RANGE = 2; // degrees: what turns less than that is drawn as at rest
 
 /** @param {number} radians */
 function degrees(radians) {
@@ -30,9 +31,14 @@ function degrees(radians) {
 /** @param {(number | null)[]} angles - Radians. */
 function angleTicks(angles) {
   const known = angles.filter((angle) => angle !== null);
-  const range = degrees(Math.max(...known) - Math.min(...known));
+  const [low, high] = [degrees(Math.min(...known)), degrees(Math.max(...known))];
+  const range = high - low;
+  const middle = (low + high) / 2;
   return {
     dtick: ANGLE_STEPS.find((step) => range <= MOST_TICKS * step) ?? ANGLE_STEPS[ANGLE_STEPS.length - 1],
+    ...(range < LEAST_ANGLE_RANGE && {
+      range: [middle - LEAST_ANGLE_RANGE / 2, middle + LEAST_ANGLE_RANGE / 2],
+    }),
   };
 }
 
@@ -144,7 +150,7 @@ function heading({ title }, top) {
  */
 function legend(top) {
   const font = { size: 11, color: color("muted") };
-  return { orientation: "h", x: 1.02, y: top, xanchor: "right", yanchor: "bottom", itemwidth: 30, font };
+  return { orientation: "h", x: 1, y: top, xanchor: "right", yanchor: "bottom", itemwidth: 30, font };
 }
 
 /**

@@ -30,11 +30,7 @@ export class FieldInput {
     if (typeof this.field.value === "string") {
       return text;
     }
-    try {
-      return JSON.parse(Array.isArray(this.field.value) ? `[${text}]` : text);
-    } catch {
-      return text;
-    }
+    return parsed(text, Array.isArray(this.field.value));
   }
 
   get isChanged() {
@@ -44,6 +40,49 @@ export class FieldInput {
   /** @param {boolean} isRefused */
   mark(isRefused) {
     this.input.setAttribute("aria-invalid", String(isRefused));
+  }
+}
+
+/** A place for changes of any field, also of one that the document leaves out: `path = value`, one a line. */
+export class FurtherChanges {
+  constructor() {
+    this.input = element("textarea", {
+      id: "further",
+      rows: 3,
+      spellcheck: "false",
+      autocomplete: "off",
+      placeholder: "adhesion.cutoff = 1.2\nvesicles.0.length = 7.5",
+    });
+    this.element = element(
+      "div",
+      { class: "field further" },
+      element("label", { for: "further" }, "any other change: path = value, one a line"),
+      this.input,
+    );
+  }
+
+  /** @returns {[string, unknown][]} Paths and values. */
+  get changes() {
+    const lines = this.input.value.split("\n").filter((line) => line.trim());
+    return lines.map((line) => {
+      const [, path, value] = /** @type {string[]} */ (/^([^=]*)=?(.*)$/.exec(line));
+      return [path.trim(), parsed(value.trim())];
+    });
+  }
+}
+
+/**
+ * JSON data; text that is no JSON stands for itself.
+ *
+ * @param {string} text
+ * @param {boolean} [isList] - Whether the text is what stands between the brackets of a list.
+ * @returns {unknown}
+ */
+function parsed(text, isList = false) {
+  try {
+    return JSON.parse(isList ? `[${text}]` : text);
+  } catch {
+    return text;
   }
 }
 

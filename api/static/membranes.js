@@ -18,6 +18,7 @@ const LONGEST_ARROW = 34;
 const MARGIN = 28;
 const FOOT = 48; // below the drawing, for the color bar and the scale
 const MEMBRANE_THICKNESS = 0.1; // of the unit of length, within these bounds
+const SHADES = 64; // of the color map that are told apart
 const BAR = { width: 180, height: 8 };
 
 /** A view that moves with the mean of the vesicles' centers, at one scale for the whole run. */
@@ -52,14 +53,13 @@ export class MembraneCanvas {
     const [left, top] = [width / 2, (height - FOOT) / 2];
     context.clearRect(0, 0, width, height);
     this.#drawFlow(width, height - FOOT);
-    for (const membrane of state.membranes) {
-      this.#drawMembrane(
-        membrane,
-        (value) => left + scale * (value - x),
-        (value) => top - scale * (value - y),
-        thickness,
-      );
-    }
+    const outlines = state.membranes.map((membrane) => ({
+      x: membrane.x.map((value) => left + scale * (value - x)),
+      y: membrane.y.map((value) => top - scale * (value - y)),
+      tension: membrane.tension,
+    }));
+    this.#fill(outlines);
+    this.#stroke(outlines, thickness);
     this.#drawColorBar(width, height);
     this.#drawScale(height, scale);
   }
@@ -77,37 +77,46 @@ export class MembraneCanvas {
     return { width, height };
   }
 
+  /** @param {Membrane[]} outlines - In pixels. */
+  #fill(outlines) {
+    const { context } = this;
+    context.fillStyle = this.style.surface; // the arrows are those of the fluid around
+    for (const { x, y } of outlines) {
+      context.beginPath();
+      x.forEach((value, point) => context.lineTo(value, y[point]));
+      context.fill();
+    }
+  }
+
   /**
    * One short piece for each point, between the middles of its neighbors, bent at the point.
    *
-   * @param {Membrane} membrane
-   * @param {(x: number) => number} across
-   * @param {(y: number) => number} down
+   * Pieces of one color are drawn together: with many vesicles that decides how smoothly they move.
+   *
+   * @param {Membrane[]} outlines - In pixels.
    * @param {number} lineWidth - Thin where vesicles are many and small.
    */
-  #drawMembrane({ x, y, tension }, across, down, lineWidth) {
+  #stroke(outlines, lineWidth) {
     const { context } = this;
     const [low, high] = this.range;
-    const count = x.length;
-    context.beginPath();
-    x.forEach((_, point) => context.lineTo(across(x[point]), down(y[point])));
-    context.fillStyle = this.style.surface; // the arrows are those of the fluid around
-    context.fill();
+    const pieces = Array.from({ length: SHADES }, () => new Path2D());
+    for (const { x, y, tension } of outlines) {
+      const count = x.length;
+      for (let point = 0; point < count; point += 1) {
+        const before = point === 0 ? count - 1 : point - 1;
+        const after = point === count - 1 ? 0 : point + 1;
+        const share = Math.min(Math.max((tension[point] - low) / (high - low), 0), 1);
+        const path = pieces[Math.round(share * (SHADES - 1))];
+        path.moveTo((x[before] + x[point]) / 2, (y[before] + y[point]) / 2);
+        path.quadraticCurveTo(x[point], y[point], (x[point] + x[after]) / 2, (y[point] + y[after]) / 2);
+      }
+    }
     context.lineWidth = lineWidth;
     context.lineCap = "round";
-    for (let point = 0; point < count; point += 1) {
-      const [before, after] = [(point + count - 1) % count, (point + 1) % count];
-      context.strokeStyle = tensionColor((tension[point] - low) / (high - low), this.style.isDark);
-      context.beginPath();
-      context.moveTo(across((x[before] + x[point]) / 2), down((y[before] + y[point]) / 2));
-      context.quadraticCurveTo(
-        across(x[point]),
-        down(y[point]),
-        across((x[point] + x[after]) / 2),
-        down((y[point] + y[after]) / 2),
-      );
-      context.stroke();
-    }
+    pieces.forEach((path, shade) => {
+      context.strokeStyle = tensionColor(shade / (SHADES - 1), this.style.isDark);
+      context.stroke(path);
+    });
   }
 
   /**
@@ -123,7 +132,7 @@ export class MembraneCanvas {
     const [[xx, xy], [yx, yy]] = this.gradient;
     const [columns, rows] = [Math.floor(width / ARROWS_APART), Math.floor(height / ARROWS_APART)];
     const corner = Math.hypot((xx * width + xy * height) / 2, (yx * width + yy * height) / 2);
-    this.context.strokeStyle = this.style.faint;
+    this.context.strokeStyle = this.style.arrows;
     this.context.lineWidth = 1.2;
     for (let row = 0; row < rows; row += 1) {
       for (let column = 0; column < columns; column += 1) {
@@ -207,7 +216,7 @@ function pageStyle() {
   return {
     isDark: isDark(),
     muted: color("muted"),
-    faint: color("faint"),
+    arrows: color("arrows"),
     surface: color("surface"),
     font: `12px ${window.getComputedStyle(document.body).fontFamily}`,
   };

@@ -19,7 +19,7 @@ const BY_PATH = {
   "vesicles.length": { name: "vesicle length", symbol: "L" },
   "vesicles.bending_modulus": { name: "bending modulus", symbol: "κ" },
   "vesicles.viscosity_contrast": { name: "viscosity contrast", symbol: "λ" },
-  "adhesion.cutoff": { name: "cutoff of the attraction", symbol: "r_c" },
+  "adhesion.cutoff": { name: "cutoff", symbol: "cutoff" },
 };
 
 const MOST_NUMBERS = 3; // that are listed

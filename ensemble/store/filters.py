@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import operator
 import re
 import types
@@ -190,6 +191,8 @@ def condition(text: str, document: InstrumentedAttribute[Any], fields: Fields) -
     numbers = kinds & {float, int}
     if numbers and value not in words:
         _parse(value, path, Union[tuple(numbers)])  # noqa: UP007
+        if not math.isfinite(float(value)):
+            raise StoreInputError(f"where: {value!r} is no value of {path}: it must be finite")
         # Compared as documents are, in double precision: SQL has no integers as long as Python's.
         return _of_kind(element, NUMBERS, compare(element.as_float(), float(value)))
     if kinds == {datetime}:

@@ -156,11 +156,8 @@ class Suspension:
         """
         count, points = self.membranes.count, self.membranes.points
         own = range(count)[shares.own]
-        inverses, shifts, failed = (
-            np.empty((len(own), points, points)),
-            np.empty(len(own)),
-            np.zeros(len(own)),
-        )
+        inverses, shifts = np.empty((len(own), points, points)), np.empty(len(own))
+        failed = np.zeros(len(own))
         for k, vesicle in enumerate(own):
             alone, its_geometry = self._alone(geometry, vesicle)
             try:

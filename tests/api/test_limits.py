@@ -99,7 +99,12 @@ def test_documents_that_are_none(unharmed, content):
         {"preset": "critical-hamaker", "set": {"sweep.values": list(range(1, 20_000))}},
         {"preset": "critical-hamaker", "set": {"search.tolerance": 1e-300}},
         {"preset": "suspension-shear", "set": {"arrangement.count": 4000, "vesicles.angle": 1.0}},
+        {"preset": "suspension-shear", "set": {"arrangement.count": "4000"}},
+        {"preset": "suspension-shear", "set": {"arrangement.count": 4000.0}},
         {"scene": {"horizon": 1, "arrangement": {"kind": "lattice", "columns": 64, "rows": 64}}},
+        {"preset": "doublet-shear", "set": {"output.interval": 1e-300}},
+        {"preset": "doublet-shear", "set": {"output.frame_interval": 1e-5}},
+        {"preset": "critical-hamaker", "set": {"sweep.parameter": "output.interval", "sweep.values": [1e-9]}},
         {"preset": "critical-hamaker", "set": {"search.limits": [5e-324, 1.7e308], "scene.horizon": 1e9}},
         {"preset": "doublet-shear", "set": {f"criteria.{number}": 1 for number in range(10_000)}},
     ],
@@ -183,6 +188,11 @@ def test_filters_are_no_sql(reading, condition):
     else:
         assert_refused(response, 422)
     assert reading.get("/runs").json() == before
+
+
+@pytest.mark.parametrize("number", ["NaN", "-Infinity", "1e999"])
+def test_filters_compare_with_finite_numbers(reading, number):
+    assert_refused(reading.get("/runs", params={"where": f"flow.rate>{number}"}), 422)
 
 
 def raw(client: httpx.Client, *pieces: bytes, pause: float = 0.0) -> bytes:

@@ -239,6 +239,8 @@ def test_the_estimate_is_points_times_vesicles_times_time(submitting):
     estimate = submitting.post("/estimate", json={"scene": scene}).json()
     assert estimate["runs"] == 1
     assert estimate["cost"] == 64 * 2 * 100.0 * 4
+    many = {"preset": "suspension-shear", "set": {"arrangement.count": 40}}
+    assert submitting.post("/estimate", json=many).json()["cost"] == 64 * 40 * 20.0 * 4
     finer = submitting.post("/estimate", json={"scene": scene, "set": {"numerics.points": 128}}).json()
     assert finer["cost"] == 2 * estimate["cost"]
     study = submitting.post("/estimate", json={"preset": "critical-hamaker"}).json()

@@ -117,8 +117,7 @@ def test_locations_of_a_path() -> None:
         ({"horizon": -3}, "horizon: -3 — input should be greater than 0"),
         (
             {"numerics.points": 8},
-            "numerics.points: 8 — input should be greater than or equal to 16; "
-            "numerics.points: 8 — input should be 'auto'",
+            "numerics.points: 8 — input should be greater than or equal to 16, or input should be 'auto'",
         ),
         ({"flow.rate": -1.0}, "flow.rate: -1.0 — input should be greater than or equal to 0"),
         ({"flow.speed": 3}, "flow.speed: 3 — extra inputs are not permitted"),

@@ -123,6 +123,26 @@ with abort_guard(communicator):
     simulate(DOUBLET.model_copy(update={"numerics": numerics}), parallel=Ranks(communicator))
 """
 
+DISTORTED = """
+import numpy as np
+from ensemble.mpi import abort_guard, world
+from solver.equation import equation_of_motion
+from solver.parallel import Ranks
+from solver.start import placed_state
+from solver.tension import TensionNotFoundError
+from tests.solver.suspensions import suspension
+communicator = world()
+with abort_guard(communicator):
+    scene = suspension(7, 32)
+    state = placed_state(scene)
+    state[6 * 32 : 7 * 32] += 10 * np.random.default_rng(1).standard_normal(32)
+    equation = equation_of_motion(scene, Ranks(communicator))
+    try:
+        equation.rate(state)
+    except TensionNotFoundError as error:
+        print(f"[{error}]", end=" ", flush=True)
+"""
+
 
 def run(launcher: Any, ranks: int, code: str) -> subprocess.CompletedProcess[str]:
     completed: subprocess.CompletedProcess[str] = launcher.run(ranks, [sys.executable, "-c", code])
@@ -150,3 +170,9 @@ def test_the_first_rank_alone_is_asked_whether_to_stop_and_stops_all(launcher: A
     result = run(launcher, 2, CANCELLED)
     assert result.stdout.count("cancelled") == 2, result.stderr
     assert {"0", "3"} <= set(result.stdout.split())
+
+
+def test_a_vesicle_that_fails_on_one_rank_fails_on_all(launcher: Any) -> None:
+    result = run(launcher, 2, DISTORTED)
+    assert result.returncode == 0, result.stderr
+    assert result.stdout.count("vesicle 6 is too distorted") == 2, result.stdout

@@ -7,6 +7,15 @@ import { dateAndTime, words } from "../format.js";
 
 /** @typedef {import("../diagram.js").Boundary} Boundary */
 
+/** Presets to begin with: what they ask and how. */
+const BEGINNINGS = [
+  ["critical-hamaker", "How much adhesion holds a doublet in shear?", "The critical Hamaker constant, shear rate by shear rate"],
+  ["critical-extension-rate", "How strong a trap tears it apart?", "The critical extension rate against reduced area"],
+  ["critical-viscosity-contrast", "When does treading give way to tumbling?", "The critical viscosity contrast of one vesicle"],
+  ["doublet-shear", "Watch a doublet turn", "One run in shear, to look at"],
+  ["suspension-shear", "Watch a suspension", "Two dozen adhering vesicles in shear"],
+];
+
 /** @param {import("../router.js").Place} place */
 export async function showBoundaries({ content, parameters, signal }) {
   /** @type {Boundary[]} */
@@ -27,6 +36,13 @@ export async function showBoundaries({ content, parameters, signal }) {
 }
 
 function invitation() {
+  const ways = BEGINNINGS.map(([preset, question, answer]) =>
+    element(
+      "li",
+      {},
+      element("a", { href: `#/new?preset=${preset}` }, element("strong", {}, question), element("span", {}, answer)),
+    ),
+  );
   return [
     element("h1", {}, "When do two vesicles stay together in a flow?"),
     element(
@@ -35,7 +51,7 @@ function invitation() {
       "No boundary has been traced in this store yet. A study finds, for each value of one parameter, the " +
         "critical value of another, and keeps every simulation behind it.",
     ),
-    element("p", {}, element("a", { class: "button primary", href: "#/new" }, "Trace one")),
+    element("nav", { class: "shelf", "aria-label": "Ways to begin" }, element("ul", {}, ...ways)),
   ];
 }
 

@@ -31,10 +31,12 @@ export async function showRun({ content, parameters, query, signal }) {
     sceneOf(run),
   );
 
+  const loading = stage.appendChild(element("p", { class: "note", role: "status" }, "Loading the states…"));
   const [frames, { series }] = await Promise.all([
     Frames.of(run, signal),
     get(`/runs/${key}/series`, signal),
   ]);
+  loading.remove();
   const plot = new Plot(plots, signal);
   const drawn = plot.draw(() => histories(series));
   if (frames.states.length === 0) {
@@ -79,12 +81,13 @@ function keepTime(player, query) {
 
 /** @param {any} run */
 function heading({ key, outcome, time, scene, failure }) {
+  const verb = outcome === "undecided" || outcome === "failed" ? "ended" : "decided";
   return element(
     "div",
     { class: "heading" },
     element("h1", {}, outcomeLabel(outcome)),
     element("a", { class: "button", href: `#/new?run=${key}` }, "Run again with changes"),
-    element("p", {}, `${describe(scene)}; decided at t = ${number(time)}`),
+    element("p", {}, `${describe(scene)}; ${verb} at t = ${number(time)}`),
     failure ? element("p", { class: "alert" }, failure) : null,
   );
 }

@@ -4,7 +4,7 @@ import { get, getAll, post } from "../api.js";
 import { element } from "../dom.js";
 import { fieldsOf } from "../fields.js";
 import { number, words } from "../format.js";
-import { FieldInput } from "../inputs.js";
+import { FieldInput, FurtherChanges } from "../inputs.js";
 import { alertAbout, messageOf } from "../problems.js";
 import { goTo } from "../router.js";
 
@@ -32,6 +32,7 @@ export async function showSubmission({ content, query, signal }) {
       choices(presets, "preset" in template.origin ? template.origin.preset : null),
     ),
   );
+  content.querySelector(".shelf [aria-current]")?.scrollIntoView({ block: "nearest", inline: "center" });
 }
 
 /**
@@ -56,24 +57,39 @@ async function templateOf(query, presets, signal) {
  * @param {string | null} current
  */
 function choices(presets, current) {
-  const links = presets.map(({ name, kind, estimate }) =>
+  const shelf = (/** @type {string} */ title, /** @type {string} */ wanted) => [
+    element("h2", {}, title),
     element(
-      "li",
+      "ul",
       {},
-      element(
-        "a",
-        { href: `#/new?preset=${name}`, "aria-current": name === current ? "true" : null },
-        element("strong", {}, words(name)),
-        element("span", {}, kind === "study" ? `study, up to ${estimate.runs} runs` : "one run"),
-      ),
+      ...presets
+        .filter(({ kind }) => kind === wanted)
+        .map(({ name, document, estimate }) =>
+          element(
+            "li",
+            {},
+            element(
+              "a",
+              { href: `#/new?preset=${name}`, "aria-current": name === current ? "true" : null },
+              element("strong", {}, words(name)),
+              element("span", {}, wanted === "study" ? `up to ${estimate.runs} runs` : contents(document)),
+            ),
+          ),
+        ),
     ),
-  );
+  ];
   return element(
     "nav",
     { class: "shelf", "aria-label": "Presets" },
-    element("h2", {}, "Presets"),
-    element("ul", {}, ...links),
+    ...shelf("Trace a boundary", "study"),
+    ...shelf("Simulate one scene", "scene"),
   );
+}
+
+/** @param {any} scene */
+function contents({ vesicles, arrangement, flow }) {
+  const count = arrangement?.count ?? vesicles.length;
+  return `${count === 1 ? "1 vesicle" : `${count} vesicles`}, ${flow ? flow.kind : "at rest"}`;
 }
 
 class SubmissionForm {
@@ -90,6 +106,7 @@ class SubmissionForm {
     this.template = template;
     this.signal = signal;
     this.inputs = fieldsOf(template.document).map((field) => new FieldInput(field));
+    this.further = new FurtherChanges();
     this.ranks = element("input", {
       id: "ranks",
       type: "number",
@@ -122,6 +139,7 @@ class SubmissionForm {
         {},
         element("summary", {}, `${others.length} more parameters`),
         element("div", { class: "fields" }, ...others),
+        this.further.element,
       ),
       element(
         "div",
@@ -153,7 +171,8 @@ class SubmissionForm {
     const limits = [this.ranks, this.seconds]
       .filter((input) => input.value)
       .map((input) => [input.id, Number(input.value)]);
-    return { ...this.template.origin, ...Object.fromEntries(limits), set: Object.fromEntries(changed) };
+    const changes = Object.fromEntries([...changed, ...this.further.changes]);
+    return { ...this.template.origin, ...Object.fromEntries(limits), set: changes };
   }
 
   #onInput() {
