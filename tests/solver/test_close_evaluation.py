@@ -99,9 +99,7 @@ def ellipse_and_membrane(reduced_area: float, points: int) -> tuple[Ellipse, Mem
 def error(reduced_area: float, points: int, gap: float, density: Density) -> float:
     """Largest error over the largest velocity, at targets around an ellipse, ``gap`` spacings from it."""
     ellipse, membrane, parameters = ellipse_and_membrane(reduced_area, points)
-    nearest = np.concatenate(
-        [np.linspace(0.0, 6.2, 13), parameters[[3, points // 4]]]
-    )  # some opposite points
+    nearest = np.concatenate([np.linspace(0.0, 6.2, 7), parameters[[3, points // 4]]])  # some opposite points
     targets = ellipse.points(nearest) + gap * membrane.spacing * outward(ellipse, nearest)
     computed = membrane.velocity(targets, density(ellipse, parameters))
     pairs = zip(targets.T, nearest, strict=True)
