@@ -147,6 +147,16 @@ def _place(
     return tangents, points, curve_tangents, curve_points
 
 
+@compiled
+def _radii(points: Array, centers: Array) -> Array:
+    """Make the `Geometry.radii` of points (2, M, N) about centers (2, M)."""
+    radii = np.empty(points.shape[1])
+    for vesicle in range(radii.size):
+        dx, dy = points[0, vesicle] - centers[0, vesicle], points[1, vesicle] - centers[1, vesicle]
+        radii[vesicle] = np.sqrt(np.max(dx * dx + dy * dy))
+    return radii
+
+
 class Geometry:
     """Points and tangents of all membranes in one state.
 
@@ -173,6 +183,11 @@ class Geometry:
     def normals(self) -> Array:
         """Inward unit normals, (2, M, N)."""
         return np.stack([-self.tangents[1], self.tangents[0]])
+
+    @cached_property
+    def radii(self) -> Array:
+        """Of the circles about the centers that hold each vesicle's points, (M,)."""
+        return np.asarray(_radii(self.points, self.centers))
 
     @cached_property
     def curvature(self) -> Array:

@@ -70,8 +70,7 @@ class Neighbors:
     def __init__(self, geometry: Geometry, reach: float) -> None:
         membranes = geometry.membranes
         self._points, self._curves = membranes.points, membranes.count
-        centers = geometry.centers
-        radii = np.sqrt(np.max(np.sum((geometry.points - centers[:, :, None]) ** 2, axis=0), axis=1))
+        centers, radii = geometry.centers, geometry.radii
         allowed = reach * membranes.spacing
         # Points see the curve between them at most half a spacing nearer than its points.
         found = cKDTree(centers.T).query_pairs(

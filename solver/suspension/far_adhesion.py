@@ -28,11 +28,10 @@ def seen(geometry: Geometry, own: slice, needed: float) -> Iterator[tuple[int, s
     at the distance d; ``needed`` is how many e-folds that shall be.
     """
     points, centers, spacing = geometry.points, geometry.centers, geometry.membranes.spacing
-    radii = np.sqrt(np.max(np.sum((points - centers[:, :, None]) ** 2, axis=0), axis=1))
     size = points.shape[2]
     sources = np.empty((3, points[0].size))
     for vesicle in range(own.start // size, -(-own.stop // size)):
-        used = _gather_sources(points, spacing, centers, radii, vesicle, needed, sources)
+        used = _gather_sources(points, spacing, centers, geometry.radii, vesicle, needed, sources)
         rows = slice(max(own.start - vesicle * size, 0), min(own.stop - vesicle * size, size))
         yield vesicle, rows, sources[:, :used]
 

@@ -26,25 +26,22 @@ LARGEST_ORDER = 32
 
 
 @compiled
-def orders_between(points: Array, centers: Array, accuracy: float, out: Orders) -> None:
+def orders_between(points: Array, centers: Array, radii: Array, accuracy: float, out: Orders) -> None:
     """Write how many terms each vesicle needs of each other's series, (M, M).
 
     Zero where they do not serve.
     """
     needed = -np.log(accuracy)
-    radii = np.empty(points.shape[1])
-    for source in range(radii.size):
-        dx = points[0, source] - centers[0, source]
-        dy = points[1, source] - centers[1, source]
-        radii[source] = np.sqrt(np.max(dx * dx + dy * dy))
+    nearest = np.empty(radii.size)
     for target in range(out.shape[0]):
-        for source in range(radii.size):
-            nearest = np.inf
-            for i in range(points.shape[2]):
+        nearest[:] = np.inf
+        for i in range(points.shape[2]):
+            for source in range(radii.size):
                 dx = points[0, target, i] - centers[0, source]
                 dy = points[1, target, i] - centers[1, source]
-                nearest = min(nearest, dx * dx + dy * dy)
-            decay = 0.5 * np.log(nearest) - np.log(radii[source])
+                nearest[source] = min(nearest[source], dx * dx + dy * dy)
+        for source in range(radii.size):
+            decay = 0.5 * np.log(nearest[source]) - np.log(radii[source])
             serves = source != target and decay * LARGEST_ORDER >= needed
             out[target, source] = max(2, int(np.ceil(needed / decay))) if serves else 0
 

@@ -149,7 +149,7 @@ class SummedSingleLayer:
         count, points = membranes.count, membranes.points
         refinement = neighbors.refinement(self.ratio)
         orders = np.empty((count, count), dtype=np.int64)
-        orders_between(geometry.points, geometry.centers, self._accuracy, orders)
+        orders_between(geometry.points, geometry.centers, geometry.radii, self._accuracy, orders)
 
         def costs() -> Array:
             near = row_costs(refinement, count * points).reshape(count, points).sum(axis=1)

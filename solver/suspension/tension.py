@@ -128,10 +128,10 @@ class SummedInextensibility:
             direction = correction + (product / previous) * direction
         else:
             raise TensionNotFoundError("the tension could not be found: the membranes are too distorted")
-        found = np.concatenate([velocity, tension[None]])
-        velocity_x, velocity_y, tension = shares.gather(found, axis=1)
+        gradient = velocity @ derivative
+        turning = (tangents[0] * gradient[1] - tangents[1] * gradient[0]) / spacing
+        velocity_x, velocity_y, turning, tension = shares.gather(
+            np.stack([*velocity, turning, tension]), axis=1
+        )
         self._last = tension
-        velocity = np.stack([velocity_x, velocity_y])
-        gradient = geometry.arclength_derivative(velocity)
-        turning = geometry.tangents[0] * gradient[1] - geometry.tangents[1] * gradient[0]
-        return Inextensible(tension, velocity, turning)
+        return Inextensible(tension, np.stack([velocity_x, velocity_y]), turning)
