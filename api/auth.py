@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from http import HTTPStatus
 from ipaddress import ip_address
 from typing import Annotated
+from urllib.parse import urlsplit
 
 from fastapi import Depends, Request
 from fastapi.openapi.models import HTTPBearer
@@ -18,6 +20,7 @@ from api.service import Service, service_of
 
 LOCAL_USER = "local"
 LOOPBACK_NAMES = {"localhost", "127.0.0.1", "::1"}
+MOST_HOSTS = 64  # whose judgment is kept: clients of one service write few
 
 
 @dataclass(frozen=True)
@@ -35,6 +38,15 @@ def is_loopback(host: str) -> bool:
         return ip_address(host).is_loopback
     except ValueError:
         return host == "localhost"
+
+
+@lru_cache(MOST_HOSTS)
+def _names_loopback(host: str) -> bool:
+    """Tell whether a Host header, which may have a port, names this machine."""
+    try:
+        return urlsplit(f"//{host}").hostname in LOOPBACK_NAMES
+    except ValueError:  # brackets that hold no address
+        return False
 
 
 class Allowed(SecurityBase):
@@ -64,7 +76,7 @@ async def _identify(request: Request, service: Service) -> Caller:
     """Say who asks; a service without tokens answers whoever reaches it on this machine."""
     if not service.needs_tokens:
         # A page of another site that has its name point here would send that name.
-        if request.url.hostname not in LOOPBACK_NAMES:
+        if not _names_loopback(request.headers.get("host", "")):
             raise Problem(
                 HTTPStatus.MISDIRECTED_REQUEST, "Host: this service answers to localhost and 127.0.0.1 only"
             )

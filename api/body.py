@@ -26,18 +26,17 @@ class BoundedBody:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        announced = int(Headers(scope=scope).get("content-length", "0"))
         received = 0
         complete = False
-        deadline = asyncio.get_running_loop().time() + self._seconds
+        begun = asyncio.get_running_loop().time()
 
         async def receive_bounded() -> Message:
             nonlocal received, complete
             if complete:  # what follows the body is the client going away, for which a listener waits long
                 return await receive()
-            self._check(announced)
+            self._check(int(Headers(scope=scope).get("content-length", "0")))
             try:
-                async with asyncio.timeout_at(deadline):
+                async with asyncio.timeout_at(begun + self._seconds):
                     message = await receive()
             except TimeoutError:
                 raise HTTPException(

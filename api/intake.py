@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import threading
-from collections import deque
 from collections.abc import Mapping
-from concurrent.futures import Future
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any
 
-from sqlalchemy import Connection, func, select
+from sqlalchemy import Connection, bindparam, func, select
 from sqlalchemy.dialects import postgresql, sqlite
 
 from api.database import Database
@@ -18,6 +17,11 @@ from api.tables import JobRow
 
 # The clause for conflicts is not in the SQL that all databases have in common.
 _INSERT: Mapping[str, Any] = {"postgresql": postgresql.insert, "sqlite": sqlite.insert}
+_UNFINISHED = (
+    select(JobRow.owner, func.count())
+    .where(JobRow.owner.in_(bindparam("owners", expanding=True)), JobRow.status.in_(UNFINISHED))
+    .group_by(JobRow.owner)
+)
 
 
 @dataclass(frozen=True)
@@ -28,31 +32,32 @@ class _Arrival:
 
 
 class Intake:
-    """Adds jobs to a database, from any thread."""
+    """Adds jobs to a database, for any number of threads, from one of its own."""
 
     def __init__(self, database: Database) -> None:
         self._database = database
         # RETURNING names those that are new; an idempotency key that is there already adds no job.
         self._insert = _INSERT[database.dialect](JobRow).on_conflict_do_nothing().returning(JobRow.id)
-        self._arrivals: deque[_Arrival] = deque()
-        self._turn = threading.Lock()
+        self._arrivals: list[_Arrival] = []
+        self._changing = threading.Lock()
+        self._writer = ThreadPoolExecutor(1, thread_name_prefix="intake")
 
-    def add(self, row: Mapping[str, Any], most_unfinished: int | None) -> bool:
+    def add(self, row: Mapping[str, Any], most_unfinished: int | None) -> Future[bool]:
         """Add a job unless its owner has too many, or its idempotency key is there already.
 
-        It is on disk when this returns True.
+        It is on disk when the future's result is True.
         """
         arrival = _Arrival(row, most_unfinished)
-        self._arrivals.append(arrival)
-        with self._turn:  # whoever has it acts for all who wait for it
-            if not arrival.accepted.done():
-                self._take_all()
-        return arrival.accepted.result()
+        with self._changing:
+            self._arrivals.append(arrival)
+            first = len(self._arrivals) == 1
+        if first:  # who comes later is taken along with it
+            self._writer.submit(self._take_all)
+        return arrival.accepted
 
     def _take_all(self) -> None:
-        arrivals = []
-        while self._arrivals:  # one by one: another thread may be adding to them
-            arrivals.append(self._arrivals.popleft())
+        with self._changing:
+            arrivals, self._arrivals = self._arrivals, []
         try:
             with self._database.begin() as connection:
                 new = self._new(connection, arrivals)
@@ -76,12 +81,7 @@ class Intake:
 
 def _unfinished(connection: Connection, owners: set[str]) -> dict[str, int]:
     """How many jobs of each owner are not finished."""
-    query = (
-        select(JobRow.owner, func.count())
-        .where(JobRow.owner.in_(owners), JobRow.status.in_(UNFINISHED))
-        .group_by(JobRow.owner)
-    )
     counted = dict.fromkeys(owners, 0)
-    for owner, count in connection.execute(query):
+    for owner, count in connection.execute(_UNFINISHED, {"owners": list(owners)}):
         counted[owner] = count
     return counted

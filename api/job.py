@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
@@ -118,6 +119,11 @@ class Work:
     def key(self) -> str:
         """Key of the boundary or the run that comes of it."""
         return self.model.key if isinstance(self.model, Study) else run_key(self.model)
+
+    @cached_property
+    def text(self) -> str:
+        """The document as JSON, the same for equal documents."""
+        return json.dumps(self.document, sort_keys=True)
 
     @cached_property
     def document(self) -> dict[str, Any]:

@@ -10,6 +10,7 @@ import hashlib
 import json
 import secrets
 from collections.abc import Callable
+from concurrent.futures import Future
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -18,7 +19,6 @@ from typing import Any
 from sqlalchemy import (
     ScalarSelect,
     Update,
-    bindparam,
     case,
     func,
     literal,
@@ -29,7 +29,8 @@ from sqlalchemy import (
 
 from api.database import Database
 from api.intake import Intake
-from api.job import UNFINISHED, IdempotencyConflict, Job, Lease, NoSuchJob, Status, TooManyJobs, Work
+from api.job import UNFINISHED, IdempotencyConflict, Job, Lease, Status, TooManyJobs, Work
+from api.job_records import JobRecords
 from api.tables import JobRow
 from api.worker_name import has_died
 from ensemble.timestamp import now
@@ -38,8 +39,17 @@ LEASE_SECONDS = 3.0
 LOGS = "jobs"  # directory in the store
 
 _SEEN = tuple(getattr(JobRow, name) for name in Job.model_fields)
-# Made once: a statement that is made anew costs as much as the rest of a request for a job.
-_ONE = select(*_SEEN).where(JobRow.id == bindparam("identifier"))
+
+
+@dataclass(frozen=True)
+class Offer:
+    """A job on its way to disk; `accepted` has a result as soon as that is decided."""
+
+    job: Job
+    idempotency_key: str | None
+    fingerprint: str
+    most_unfinished: int | None
+    accepted: Future[bool]
 
 
 @dataclass(frozen=True)
@@ -53,6 +63,8 @@ class Submitted:
 class Jobs:
     """The jobs of a service, for any number of processes and threads at once.
 
+    `records` are the same jobs as JSON.
+
     Parameters
     ----------
     database : Database
@@ -64,6 +76,7 @@ class Jobs:
     """
 
     def __init__(self, database: Database, store: Path, clock: Callable[[], datetime] = now) -> None:
+        self.records = JobRecords(database)
         self._database = database
         self._intake = Intake(database)
         self._directory = store / LOGS
@@ -80,6 +93,21 @@ class Jobs:
     ) -> Submitted:
         """Accept a job; it is on disk when this returns.
 
+        Parameters are those of `offer`, and what is raised is what `settled` raises.
+        """
+        return self.settled(self.offer(work, owner, ranks, seconds, idempotency_key, most_unfinished))
+
+    def offer(
+        self,
+        work: Work,
+        owner: str,
+        ranks: int,
+        seconds: float,
+        idempotency_key: str | None = None,
+        most_unfinished: int | None = None,
+    ) -> Offer:
+        """Put a job on its way to disk, and return at once.
+
         Parameters
         ----------
         work : Work
@@ -91,14 +119,6 @@ class Jobs:
             Of the owner's choice.  However often a request comes with one key, it makes one job.
         most_unfinished : int, optional
             How many unfinished jobs the owner may have, this one included.
-
-        Raises
-        ------
-        IdempotencyConflict
-            If the key came with another request before.
-        TooManyJobs
-            If the owner has as many as that.  Processes that accept jobs at the same moment do not see each
-            other's, so together they may accept a few more.
         """
         moment = self._clock()
         job = Job(
@@ -119,34 +139,49 @@ class Jobs:
             updated=moment,
         )
         fingerprint = _fingerprint(work, ranks, seconds)
-        row = job.model_dump() | {
+        row = dict(job) | {
             "document": work.document,
             "idempotency_key": idempotency_key,
             "fingerprint": fingerprint,
         }
-        if not self._intake.add(row, most_unfinished):
-            earlier = self._earlier(owner, idempotency_key, fingerprint)
-            if earlier is None:
-                raise TooManyJobs(
-                    f"jobs: {most_unfinished} of {owner} are not finished, and there may not be more"
-                )
-            return Submitted(earlier, new=False)
-        return Submitted(job, new=True)
+        accepted = self._intake.add(row, most_unfinished)
+        return Offer(job, idempotency_key, fingerprint, most_unfinished, accepted)
 
-    def _earlier(self, owner: str, idempotency_key: str | None, fingerprint: str) -> Job | None:
+    def settled(self, offer: Offer) -> Submitted:
+        """Wait until a job that was offered is on disk.
+
+        Raises
+        ------
+        IdempotencyConflict
+            If the key came with another request before.
+        TooManyJobs
+            If the owner has as many as that.  Processes that accept jobs at the same moment do not see each
+            other's, so together they may accept a few more.
+        """
+        if offer.accepted.result():
+            return Submitted(offer.job, new=True)
+        earlier = self._earlier(offer)
+        if earlier is None:
+            raise TooManyJobs(
+                f"jobs: {offer.most_unfinished} of {offer.job.owner} are not finished, "
+                "and there may not be more"
+            )
+        return Submitted(earlier, new=False)
+
+    def _earlier(self, offer: Offer) -> Job | None:
         """Return the job that an idempotency key has made already."""
-        if idempotency_key is None:
+        if offer.idempotency_key is None:
             return None
         query = select(*_SEEN, JobRow.fingerprint).where(
-            JobRow.owner == owner, JobRow.idempotency_key == idempotency_key
+            JobRow.owner == offer.job.owner, JobRow.idempotency_key == offer.idempotency_key
         )
         with self._database.connect() as connection:
             row = connection.execute(query).one_or_none()
         if row is None:
             return None
-        if row.fingerprint != fingerprint:
+        if row.fingerprint != offer.fingerprint:
             raise IdempotencyConflict(
-                f"Idempotency-Key: {idempotency_key} came with another request before; use a new one"
+                f"Idempotency-Key: {offer.idempotency_key} came with another request before; use a new one"
             )
         return Job.model_validate(row)
 
@@ -157,11 +192,7 @@ class Jobs:
         ------
         NoSuchJob
         """
-        with self._database.connect() as connection:
-            row = connection.execute(_ONE, {"identifier": identifier}).one_or_none()
-        if row is None:
-            raise NoSuchJob(f"job: there is no job {identifier}")
-        return Job.model_validate(row)
+        return Job.model_validate_json(self.records.one(identifier).json)
 
     def document(self, job: Job) -> dict[str, Any]:
         """Return the study or the scene that a job carries out."""
@@ -178,16 +209,8 @@ class Jobs:
         NoSuchJob
             If there is no job `after`.
         """
-        query = select(*_SEEN).order_by(JobRow.number.desc()).limit(limit)
-        if after is not None:
-            self.get(after)
-            query = query.where(JobRow.number < _number(after))
-        if owner is not None:
-            query = query.where(JobRow.owner == owner)
-        if status is not None:
-            query = query.where(JobRow.status == status)
-        with self._database.connect() as connection:
-            return [Job.model_validate(row) for row in connection.execute(query)]
+        found = self.records.page(limit, after, owner, status)
+        return [Job.model_validate_json(record.json) for record in found]
 
     def counts(self) -> dict[Status, int]:
         """Say how many jobs there are of each status."""
@@ -280,12 +303,8 @@ class Jobs:
 
 
 def _fingerprint(work: Work, ranks: int, seconds: float) -> str:
-    request = json.dumps([work.name, work.document, ranks, seconds], sort_keys=True)
+    request = f"[{json.dumps(work.name)}, {work.text}, {json.dumps(ranks)}, {json.dumps(seconds)}]"
     return hashlib.sha256(request.encode()).hexdigest()
-
-
-def _number(identifier: str) -> ScalarSelect[int]:
-    return select(JobRow.number).where(JobRow.id == identifier).scalar_subquery()
 
 
 def _next_number() -> ScalarSelect[int]:

@@ -22,7 +22,7 @@ _END_SECONDS = 5.0
 
 
 def mpirun_command(ranks: int, arguments: Sequence[str]) -> list[str]:
-    """Return the command that runs `ensemble` with these arguments on so many ranks.
+    """Return the command that runs `ensemble` with these arguments on so many ranks, at low priority.
 
     Raises
     ------
@@ -34,7 +34,7 @@ def mpirun_command(ranks: int, arguments: Sequence[str]) -> list[str]:
     if mpirun is None:
         raise BadInput("mpirun: there is none on the PATH (the extra 'mpich' brings one)")
     # -P: a folder of a package's name where the service was started must not take its place.
-    return [mpirun, "-n", str(ranks), sys.executable, "-P", "-m", "ensemble.cli", *arguments]
+    return [mpirun, "-n", str(ranks), sys.executable, "-P", "-m", "api.background", *arguments]
 
 
 class Process(AbstractContextManager["Process"]):

@@ -14,5 +14,7 @@ class Scope(StrEnum):
 
     def includes(self, other: Scope) -> bool:
         """Whether this one allows all that the other does."""
-        order = list(Scope)
-        return order.index(self) >= order.index(other)
+        return _RANKS[self] >= _RANKS[other]
+
+
+_RANKS = {scope: rank for rank, scope in enumerate(Scope)}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import gc
 import logging
 import subprocess
 import sys
@@ -12,23 +13,28 @@ from contextlib import AbstractAsyncContextManager, ExitStack, asynccontextmanag
 
 import uvicorn
 from anyio import to_thread
+from cachetools import TTLCache
 from fastapi import FastAPI
 
 from api.app import create_app
 from api.auth import is_loopback
 from api.database import Database
+from api.job import preset_work
 from api.jobs import Jobs
 from api.limits import RateLimits
 from api.protocol import impatient
 from api.service import Service
 from api.settings import Settings
+from api.submissions import Submissions
 from api.tokens import Tokens
 from ensemble.errors import BadInput
 from ensemble.store import Store
 from ensemble.store.database import Place, is_file
+from ensemble.study import preset_names
 
+MOST_WATCHED = 1024  # jobs that are looked at together by those who listen
 THREADS = 8  # that read and write; more of them would only wait for each other
-RESTART_SECONDS = 1.0
+RESTART_SECONDS = 1.0  # between two starts of a worker that ends at once
 STOP_SECONDS = 10.0  # that a worker has to end its job's processes
 DRAIN_SECONDS = 3  # that requests have to be answered when the server ends
 
@@ -65,6 +71,9 @@ def opened(settings: Settings) -> Iterator[Service]:
             settings=settings,
             store=store,
             jobs=Jobs(database, store.path),
+            submissions=Submissions(settings.maximum_cost),
+            # Kept for less time than a listener waits: nobody is sent an older state than the one before.
+            watched=TTLCache(MOST_WATCHED, ttl=settings.event_seconds / 2),
             tokens=tokens,
             limits=RateLimits(settings.request_rate, settings.refusal_rate),
             needs_tokens=bool(tokens.all()),
@@ -99,6 +108,7 @@ def _beside_workers(service: Service, workers: int) -> Callable[[FastAPI], Abstr
             log.warning("There are no tokens: whoever reaches this address may do everything.")
         to_thread.current_default_thread_limiter().total_tokens = THREADS
         tasks = [asyncio.create_task(_keep_running(command)) for _ in range(workers)]
+        tasks.append(asyncio.create_task(to_thread.run_sync(_warm_up)))
         try:
             yield
         finally:
@@ -109,9 +119,22 @@ def _beside_workers(service: Service, workers: int) -> Callable[[FastAPI], Abstr
     return lifespan
 
 
+def _warm_up() -> None:
+    """Do beforehand what the first submission would wait for, and then have the collector leave it alone.
+
+    To look through all that a server has loaded takes the collector longer than a hundred requests.
+    """
+    for name in preset_names():
+        preset_work(name, {})
+    gc.collect()
+    gc.freeze()
+
+
 async def _keep_running(command: list[str]) -> None:
     """Run a worker, and another one whenever it ends, until cancelled."""
+    clock = asyncio.get_running_loop().time
     while True:
+        next_start = clock() + RESTART_SECONDS
         # Its end of the pipe tells a worker that the server is gone, however it went.
         worker = await asyncio.create_subprocess_exec(*command, stdin=subprocess.PIPE, start_new_session=True)
         try:
@@ -120,7 +143,7 @@ async def _keep_running(command: list[str]) -> None:
             await _stop(worker)
             raise
         log.error("A worker ended with status %s; starting another one.", status)
-        await asyncio.sleep(RESTART_SECONDS)
+        await asyncio.sleep(next_start - clock())
 
 
 async def _stop(worker: asyncio.subprocess.Process) -> None:

@@ -6,14 +6,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ParamSpec, TypeVar
 
+from cachetools import TTLCache
 from fastapi import Request
 from fastapi.concurrency import run_in_threadpool
 
 from api.jobs import Jobs
 from api.limits import RateLimits
 from api.settings import Settings
+from api.submissions import Submissions
 from api.tokens import Tokens
-from ensemble.store import Store
+from ensemble.store import Record, Store
 
 Arguments = ParamSpec("Arguments")
 Found = TypeVar("Found")
@@ -24,12 +26,15 @@ class Service:
     """The parts of a running service.
 
     Without `needs_tokens` it answers everybody who reaches it, which must be this machine alone.  `embedded`
-    says that its databases are files, not servers.
+    says that its databases are files, not servers.  `watched` are jobs that somebody listens to, as they were
+    a moment ago.
     """
 
     settings: Settings
     store: Store
     jobs: Jobs
+    submissions: Submissions
+    watched: TTLCache[str, Record]
     tokens: Tokens
     limits: RateLimits
     needs_tokens: bool

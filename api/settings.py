@@ -6,7 +6,6 @@ import os
 from pathlib import Path
 from typing import Annotated
 
-from limits import parse
 from pydantic import AfterValidator, Field
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
@@ -15,6 +14,8 @@ from ensemble.store.database import Place, is_file, sqlite_url
 
 
 def _rate(text: str) -> str:
+    from limits import parse  # takes a while, and a worker has no rates
+
     parse(text)  # raises ValueError
     return text
 

@@ -3,20 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from http import HTTPStatus
 from typing import Annotated, Any
 
+from cachetools import LRUCache
 from fastapi import Depends, Request
+from fastapi.concurrency import run_in_threadpool
 from pydantic import ValidationError
 from pydantic_core import from_json
 
+from api.cost import estimate
 from api.job import Kind, Work, preset_work, scene_work, study_work
 from api.problems import Problem, invalid
-from api.schemas import Submission
+from api.schemas import Estimate, Submission
 from api.size import limit_scene, limit_study
 from ensemble.errors import BadInput
 from ensemble.overrides import override
 from ensemble.study import preset_document
+
+MOST_KNOWN = 256
+LONGEST_KNOWN = 4096  # bytes
 
 
 async def body_of(request: Request) -> bytes:
@@ -30,11 +37,50 @@ async def body_of(request: Request) -> bytes:
 Body = Annotated[bytes, Depends(body_of)]
 
 
-def read_submission(body: bytes) -> Submission:
-    """Read a submission, strictly: a word is no number, and neither is true or false.
+@dataclass(frozen=True)
+class Asked:
+    """A submission that has been checked, and what it may cost."""
 
-    Not in the event loop, since vesicles are compared pair by pair.
+    submission: Submission
+    work: Work
+    estimate: Estimate
+
+
+class Submissions:
+    """Checks submissions, in the event loop of a service.
+
+    The latest short ones are kept by what was sent, since many ask for the same preset, or for a cost and
+    then for the job.
     """
+
+    def __init__(self, maximum_cost: float) -> None:
+        self._maximum_cost = maximum_cost
+        self._known: LRUCache[bytes, Asked] = LRUCache(MOST_KNOWN)
+
+    async def read(self, body: bytes) -> Asked:
+        """Return what is asked for.
+
+        Raises
+        ------
+        Problem, BadInput
+            If it is nothing that can be done; names the field.
+        """
+        asked = self._known.get(body)
+        if asked is None:
+            # Elsewhere, since a study may have many points, and a scene many vesicles to find places for.
+            asked = await run_in_threadpool(self._check, body)
+            if len(body) <= LONGEST_KNOWN:
+                self._known[body] = asked
+        return asked
+
+    def _check(self, body: bytes) -> Asked:
+        submission = read_submission(body)
+        work = requested(submission)
+        return Asked(submission, work, estimate(work.model, self._maximum_cost))
+
+
+def read_submission(body: bytes) -> Submission:
+    """Read a submission, strictly: a word is no number, and neither is true or false."""
     try:
         document = from_json(body)
         if isinstance(document, dict):
@@ -79,5 +125,7 @@ def _limit(kind: Kind, document: dict[str, Any], changes: Mapping[str, Any]) -> 
     """Refuse a document that is too large with these changes."""
     limit = limit_study if kind is Kind.STUDY else limit_scene
     # To change the vesicles of an arrangement they have to be found places first, which takes its time.
-    limit(override(document, {path: changes[path] for path in changes if "vesicles" not in path.split(".")}))
-    limit(override(document, changes))
+    others = {path: changes[path] for path in changes if "vesicles" not in path.split(".")}
+    limit(override(document, others))
+    if len(others) < len(changes):
+        limit(override(document, changes))

@@ -38,7 +38,7 @@ class Verdict:
 
 
 class Worker:
-    """Carries out jobs, one at a time, until it is told to stop.
+    """Carries out jobs, one at a time and at low priority, until it is told to stop.
 
     Parameters
     ----------

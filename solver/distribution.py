@@ -7,7 +7,6 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Discriminator, Tag, model_validator
-from scipy.stats import truncnorm
 
 from solver.model import Model, NonNegative
 
@@ -53,6 +52,8 @@ class Normal(Model):
 
     def draw(self, count: int, random: np.random.Generator) -> Array:
         """Independent values, (count,)."""
+        from scipy.stats import truncnorm  # for the reason that `solver.shapes` gives
+
         scaled = truncnorm.rvs(-DEVIATIONS, DEVIATIONS, size=count, random_state=random)
         return np.asarray(self.mean + self.deviation * scaled)
 

@@ -13,7 +13,6 @@ from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from solver.shapes import semi_axes
 from solver.vesicle import Vesicle
@@ -61,6 +60,11 @@ class Ellipses:
         )
 
 
+def _around(first: Ellipses, second: Ellipses) -> Array:
+    """Distances between the circles around ellipses, (M,): the simplest of lower bounds."""
+    return np.asarray(np.abs(first.center - second.center) - first.major - second.major)
+
+
 def clearances(first: Ellipses, second: Ellipses) -> Array:
     """Lower bounds of the distances between ellipses, (M,), short of them by at most 1e-3 of their size."""
     return np.asarray(_strips(first, second, _FEW_DIRECTIONS)[0].max(axis=1))
@@ -83,17 +87,21 @@ def distances(first: Ellipses, second: Ellipses) -> Array:
 def overlapping_pair(vesicles: tuple[Vesicle, ...]) -> tuple[int, int] | None:
     """Indices of the first two starting ellipses that touch or overlap; None if all are apart.
 
-    Only neighbors are compared, found in a tree: the work grows like the number of vesicles.
+    Only neighbors are compared, found in a tree: the work grows like the number of vesicles.  Most of
+    them are apart by a lower bound of their distance already.
     """
+    from scipy.spatial import cKDTree  # for the reason that `solver.shapes` gives
+
     if len(vesicles) < 2:
         return None
     ellipses = Ellipses.of(vesicles)
     centers = np.stack([ellipses.center.real, ellipses.center.imag], axis=1)
     pairs = cKDTree(centers).query_pairs(2 * float(ellipses.major.max()), output_type="ndarray")
-    first, second = ellipses[pairs[:, 0]], ellipses[pairs[:, 1]]
-    near = np.abs(first.center - second.center) <= first.major + second.major
-    touching = pairs[near][distances(first[near], second[near]) <= 0]
-    return None if not len(touching) else tuple(int(index) for index in min(touching.tolist()))  # type: ignore[return-value]
+    for bound in (_around, clearances, distances):
+        if not len(pairs):
+            return None
+        pairs = pairs[bound(ellipses[pairs[:, 0]], ellipses[pairs[:, 1]]) <= 0]
+    return None if not len(pairs) else tuple(int(index) for index in min(pairs.tolist()))  # type: ignore[return-value]
 
 
 def _strips(first: Ellipses, second: Ellipses, count: int) -> tuple[Array, Array]:

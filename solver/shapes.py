@@ -1,23 +1,31 @@
-"""Starting shapes: ellipses of exact reduced area and length, sampled equally in arclength."""
+"""Starting shapes: ellipses of exact reduced area and length, sampled equally in arclength.
+
+SciPy is imported by the functions that need it: to import it takes longer than all else that reads a scene,
+and a process that only hands scenes on has no shape to compute.
+"""
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
-from scipy.special import ellipe, ellipeinc
 
 from solver import curve
 
 Array = NDArray[np.float64]
 
 
+@lru_cache(1024)  # the vesicles of a scene, and the scenes of a study, are alike
 def semi_axes(reduced_area: float, length: float) -> tuple[float, float]:
     """Semi-axes a ≥ b of the ellipse with this perimeter and reduced area 4π·area/length².
 
     The perimeter is 4aE(m) with m = 1 − b²/a² (complete elliptic integral of the second kind), so the
     reduced area is π²√(1−m)/(4E(m)²), which falls from 1 to 0 as the aspect ratio falls.
     """
+    from scipy.optimize import brentq
+    from scipy.special import ellipe
+
     if reduced_area == 1.0:
         radius = length / (2 * np.pi)
         return radius, radius
@@ -36,6 +44,8 @@ def of_reduced_area(tangent_angle: Array, reduced_area: float) -> Array:
     Its deviation from a circle is scaled.  For an ellipse that the points resolve this changes nothing but
     round-off; where they do not resolve its tips, the area through them is not the ellipse's.
     """
+    from scipy.optimize import brentq
+
     turned = 2 * np.pi * np.arange(tangent_angle.size) / tangent_angle.size
     circle = turned + np.mean(tangent_angle - turned)
     deviation = tangent_angle - circle
@@ -58,6 +68,8 @@ def ellipse_tangent_angle(reduced_area: float, length: float, angle: float, poin
     angle : float
         Direction of the long axis against x, radians.  The first point is its tip.
     """
+    from scipy.special import ellipe, ellipeinc
+
     major, minor = semi_axes(reduced_area, length)
     parameter = 1 - (minor / major) ** 2
     arclength = length * np.arange(points) / points

@@ -11,7 +11,6 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import circulant
 
 Array = NDArray[np.float64]
 
@@ -24,6 +23,8 @@ def _frozen(matrix: Array) -> Array:
 
 def _convolution(symbol: NDArray[np.complexfloating]) -> Array:
     """The circulant matrix whose eigenvalue on exp(ikα) is ``symbol[k]``, in FFT order."""
+    from scipy.linalg import circulant  # for the reason that `solver.shapes` gives
+
     return _frozen(circulant(np.fft.ifft(symbol).real).astype(np.float64))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from http import HTTPStatus
 from pathlib import Path as FilePath
 from typing import Annotated
@@ -12,19 +13,16 @@ from sse_starlette import EventSourceResponse
 
 from api.auth import Reader, Submitter
 from api.caching import written
-from api.cost import estimate
 from api.description import reference
 from api.events import job_events
-from api.job import Job, NoSuchJob, Status, TooManyJobs
+from api.job import Job, Kind, NoSuchJob, Status, TooManyJobs
 from api.paging import Limit, page
 from api.problems import Problem, documented
 from api.schemas import Estimate, Page, Submission
 from api.scope import Scope
-from api.service import Service
-from api.submissions import Body, read_submission, requested
+from api.settings import Settings
+from api.submissions import Asked, Body
 from ensemble.errors import BadInput
-from ensemble.store import Record
-from ensemble.study import Study
 
 router = APIRouter(tags=["jobs"])
 
@@ -36,15 +34,15 @@ NO_SUCH_JOB = documented(HTTPStatus.NOT_FOUND)
 
 
 @router.post("/estimate", openapi_extra=BODY, responses=UNSUPPORTED)
-def estimate_cost(reader: Reader, body: Body) -> Estimate:
+async def estimate_cost(reader: Reader, body: Body) -> Estimate:
     """Say what a job may cost, without submitting it."""
-    return estimate(requested(read_submission(body)).model, reader.service.settings.maximum_cost)
+    return (await reader.service.submissions.read(body)).estimate
 
 
 @router.post(
     "/jobs", status_code=HTTPStatus.ACCEPTED, response_model=Job, openapi_extra=BODY, responses=UNSUPPORTED
 )
-def submit_job(
+async def submit_job(
     submitter: Submitter,
     body: Body,
     idempotency_key: Annotated[
@@ -54,22 +52,15 @@ def submit_job(
 ) -> Response:
     """Accept a job; it is on disk when this is answered."""
     service = submitter.service
-    submission = read_submission(body)
-    work = requested(submission)
-    ranks, seconds = _resources(service, submission, isinstance(work.model, Study))
-    cost = estimate(work.model, service.settings.maximum_cost)
-    if not cost.accepted:
-        raise Problem(
-            HTTPStatus.UNPROCESSABLE_ENTITY,
-            f"cost: {cost.cost:.3g} — must be at most {cost.maximum:.3g} "
-            "(points × vesicles × time to simulate, over all runs)",
-            cost=cost.cost,
-            maximum=cost.maximum,
-        )
+    asked = await service.submissions.read(body)
+    ranks, seconds = _resources(service.settings, asked)
+    offer = service.jobs.offer(
+        asked.work, submitter.user, ranks, seconds, idempotency_key, service.settings.maximum_jobs
+    )
+    # Not awaited itself: should the client go away, that must not cancel what shares its transaction.
+    await asyncio.wait([asyncio.wrap_future(offer.accepted)])
     try:
-        submitted = service.jobs.submit(
-            work, submitter.user, ranks, seconds, idempotency_key, service.settings.maximum_jobs
-        )
+        submitted = await service.look_up(service.jobs.settled, offer)
     except TooManyJobs as error:
         raise Problem(HTTPStatus.TOO_MANY_REQUESTS, str(error)) from error
     response = written(submitted.job)
@@ -78,10 +69,19 @@ def submit_job(
     return response
 
 
-def _resources(service: Service, submission: Submission, is_study: bool) -> tuple[int, float]:
-    settings = service.settings
-    ranks = submission.ranks or (settings.maximum_ranks if is_study else 1)
-    seconds = submission.seconds or settings.maximum_seconds
+def _resources(settings: Settings, asked: Asked) -> tuple[int, float]:
+    """On how many ranks a job runs, and how long an attempt may take."""
+    cost = asked.estimate
+    if not cost.accepted:
+        raise Problem(
+            HTTPStatus.UNPROCESSABLE_ENTITY,
+            f"cost: {cost.cost:.3g} — must be at most {cost.maximum:.3g} "
+            "(points × vesicles × time to simulate, over all runs)",
+            cost=cost.cost,
+            maximum=cost.maximum,
+        )
+    ranks = asked.submission.ranks or (settings.maximum_ranks if asked.work.kind is Kind.STUDY else 1)
+    seconds = asked.submission.seconds or settings.maximum_seconds
     if ranks > settings.maximum_ranks:
         raise BadInput(f"ranks: {ranks} — must be at most {settings.maximum_ranks}")
     if seconds > settings.maximum_seconds:
@@ -90,7 +90,7 @@ def _resources(service: Service, submission: Submission, is_study: bool) -> tupl
 
 
 @router.get("/jobs", response_model=Page[Job])
-def list_jobs(
+async def list_jobs(
     request: Request,
     reader: Reader,
     owner: Annotated[str | None, Query(max_length=64)] = None,
@@ -102,16 +102,19 @@ def list_jobs(
 ) -> Response:
     """List the jobs, the latest first."""
     try:
-        found = reader.service.jobs.latest(limit + 1, after, owner, status)
+        found = await reader.service.look_up(
+            reader.service.jobs.records.page, limit + 1, after, owner, status
+        )
     except NoSuchJob:
         raise BadInput(f"after: there is no job {after}") from None
-    return page(request, [Record(job.id, job.model_dump_json()) for job in found], limit)
+    return page(request, found, limit)
 
 
 @router.get("/jobs/{identifier}", response_model=Job, responses=NO_SUCH_JOB)
 async def get_job(reader: Reader, identifier: JobKey) -> Response:
     """Say where a job stands."""
-    return written(await reader.service.look_up(reader.service.jobs.get, identifier))
+    record = await reader.service.look_up(reader.service.jobs.records.one, identifier)
+    return written(record.json)
 
 
 @router.delete("/jobs/{identifier}", responses=NO_SUCH_JOB)
@@ -131,8 +134,8 @@ def dismiss_job(submitter: Submitter, identifier: JobKey) -> Job:
 )
 async def listen_to_job(reader: Reader, identifier: JobKey) -> EventSourceResponse:
     """Send the job as it is, and again each time it changes, until it has finished."""
-    job = await reader.service.look_up(reader.service.jobs.get, identifier)
-    return EventSourceResponse(job_events(reader.service, job))
+    record = await reader.service.look_up(reader.service.jobs.records.one, identifier)
+    return EventSourceResponse(job_events(reader.service, record))
 
 
 @router.get("/jobs/{identifier}/log", response_class=PlainTextResponse, responses=NO_SUCH_JOB)

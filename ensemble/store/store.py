@@ -1,4 +1,8 @@
-"""The store as its users see it."""
+"""The store as its users see it.
+
+What reads and writes arrays is imported by the methods that do so: it takes long, and most who open a store
+want its catalog.
+"""
 
 from __future__ import annotations
 
@@ -17,9 +21,7 @@ from sqlalchemy.exc import DatabaseError
 from ensemble.boundary import Boundary
 from ensemble.disk import flush, flush_tree, locked
 from ensemble.record import RunSummary
-from ensemble.store.archive import read_run, write_run
 from ensemble.store.catalog import Catalog, Record
-from ensemble.store.check import check_run
 from ensemble.store.database import CATALOG, PLACE, UNUSABLE, Place, reason
 from ensemble.store.errors import NotStored, StoreInputError
 from ensemble.store.staging import Writer, abandoned
@@ -109,6 +111,8 @@ class Store(AbstractContextManager["Store"]):
 
     def stage(self, run: Run) -> Staged:
         """Write a run to disk without committing it; any process may."""
+        from ensemble.store.archive import write_run
+
         staged = Staged(self._writer.place(), RunSummary.of(run))
         write_run(staged.directory, staged.summary, run)
         flush_tree(staged.directory)
@@ -189,6 +193,8 @@ class Store(AbstractContextManager["Store"]):
         StoreError
             If its files are damaged.
         """
+        from ensemble.store.archive import read_run
+
         if not self.contains(key):
             raise NotStored(f"run: there is no run {key} in {self.path}")
         return read_run(self._runs / key)
@@ -302,6 +308,8 @@ class Store(AbstractContextManager["Store"]):
         list of str
             Problems, one sentence each; empty if the store is whole.
         """
+        from ensemble.store.check import check_run
+
         try:
             summaries = self.summaries()
             self.boundaries()

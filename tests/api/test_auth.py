@@ -29,7 +29,9 @@ def test_without_tokens_whoever_is_on_this_machine_may_do_everything(submitting)
     assert submitting.delete(f"/jobs/{job['id']}").status_code == 200
 
 
-@pytest.mark.parametrize("host", ["evil.example", "evil.example:80", "localhost.evil.example"])
+@pytest.mark.parametrize(
+    "host", ["evil.example", "evil.example:80", "localhost.evil.example", "127.0.0.1@evil.example", "[", ""]
+)
 def test_without_tokens_another_name_for_this_machine_is_refused(submitting, host):
     """A page of another site, whose name points here since it was loaded, sends that name."""
     response = submitting.post("/jobs", json=SUBMISSION, headers={"Host": host})

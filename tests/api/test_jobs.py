@@ -169,6 +169,18 @@ def test_an_answer_is_repeated_even_to_an_owner_who_has_too_many(jobs):
 # Lists.
 
 
+def test_records_are_the_jobs_as_they_are_sent(jobs):
+    waiting = submit(jobs)
+    assert jobs.records.one(waiting.id).json == waiting.model_dump_json()
+    lease = leased(jobs)
+    assert jobs.records.one(waiting.id).json == lease.job.model_dump_json()
+    assert jobs.finish(lease, Status.SUCCEEDED, "both “done” and more")
+    done = jobs.get(waiting.id)
+    assert done.started is not None
+    assert done.finished is not None
+    assert jobs.records.page(1) == [(waiting.id, done.model_dump_json())]
+
+
 def test_pages_hold_every_job_once_while_others_come_in(jobs):
     submitted = [submit(jobs, owner).id for owner in ["ada", "bob"] * 6]
     pages, after = [], None

@@ -12,6 +12,7 @@ from pathlib import Path
 import psutil
 import pytest
 
+from api.background import NICENESS
 from api.database import Database
 from api.job import Job, Kind, Status, Work, preset_work
 from api.jobs import Jobs
@@ -125,10 +126,17 @@ def test_a_job_ends_at_its_time_limit(jobs, store):
     assert jobs.get(job.id).message == "stopped at its time limit, 1 s"
 
 
+def gives_way(process: psutil.Process) -> bool:
+    weight = Path(f"/proc/{process.pid}/autogroup")  # of its session, where the kernel has such weights
+    session_does = not weight.exists() or weight.read_text().split()[-1] == str(NICENESS)
+    return process.nice() == NICENESS and session_does
+
+
 def test_a_dismissed_job_leaves_no_process_and_makes_room(jobs, store):
     job, following = submit(jobs, LONG_SCENE, ranks=2), submit(jobs, QUICK_SCENE)
     with working(store) as family:
         wait_until(simulating(family, 1))
+        wait_until(lambda: gives_way(family.rank(0)))
         job_processes = family.descendants()
         assert jobs.dismiss(job.id).status is Status.DISMISSED
         wait_until(lambda: not alive(job_processes), SECONDS_TO_DISMISS)

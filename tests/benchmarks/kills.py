@@ -85,7 +85,7 @@ def _plays(process: psutil.Process, part: str) -> bool:
     except psutil.Error:
         return False
     if part == "rank":
-        return environment.get("PMI_RANK") == "0" and "ensemble.cli" in command
+        return environment.get("PMI_RANK") == "0" and "api.background" in command
     if part == "mpirun":
         return process.name().startswith("mpi")
     words = [word for word in command if word != "-P"]
@@ -149,7 +149,7 @@ def wait_for(condition: Callable[[], Any]) -> float:
     while not condition():
         if time.monotonic() - begin > PATIENCE:
             raise TimeoutError("it has not come about")
-        time.sleep(0.05)  # to look at all processes takes a while itself
+        time.sleep(0.1)  # to look at all processes takes a while itself
     return time.monotonic() - begin
 
 
@@ -168,12 +168,12 @@ def kill_once(service: Service, jobs: Jobs, victim: str, chance: random.Random) 
         Seconds until all processes of the job were `gone`, and from the start of the worker that took over
         until the job was `resumed`.  Empty if the job had ended by then.
     """
-    if chance.random() < 0.5:
+    if chance.random() < 0.25:
         # A service in which no job ever comes to its end would show little.
         finished = _finished(jobs)
         wait_for(lambda: _finished(jobs) > finished)
-    wait_for(lambda: service.find("rank"))
-    time.sleep(chance.uniform(0, 1.5))
+    wait_for(lambda: service.find("mpirun"))
+    time.sleep(chance.uniform(0, 3.0))
     wait_for(lambda: jobs.latest(1, status=Status.RUNNING) and service.find(victim))
     (job,) = jobs.latest(1, status=Status.RUNNING) or [None]
     spared = {"server"} if victim in ("server", "worker") else {"server", "worker"}
@@ -209,15 +209,17 @@ def main() -> None:
     """Kill, count and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("directory", type=Path)
-    parser.add_argument("--kills", type=int, default=50)
+    parser.add_argument("--kills", type=int, default=50, help="of each")
+    parser.add_argument("--victims", nargs="+", choices=VICTIMS, default=VICTIMS)
+    parser.add_argument("--seed", type=int, default=6)
     parser.add_argument("--minutes", type=float, default=600.0, help="after which fewer kills are enough")
     parser.add_argument("--port", type=int, default=8123)
     options = parser.parse_args()
     options.directory.mkdir(parents=True)
     store = options.directory / "store"
     Store.open(store).close()
-    chance = random.Random(6)
-    took: dict[str, list[dict[str, float]]] = {victim: [] for victim in VICTIMS}
+    chance = random.Random(options.seed)
+    took: dict[str, list[dict[str, float]]] = {victim: [] for victim in options.victims}
     remade = 0
     with queue(store) as jobs:
         service = Service(store, options.port)
@@ -225,7 +227,7 @@ def main() -> None:
         known: dict[str, str] = {}
         deadline = time.monotonic() + 60 * options.minutes
         while any(len(kills) < options.kills for kills in took.values()) and time.monotonic() < deadline:
-            for victim in VICTIMS:
+            for victim in options.victims:
                 if kill := kill_once(service, jobs, victim, chance):
                     took[victim].append(kill)
                 present = created(store)

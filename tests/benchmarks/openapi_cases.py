@@ -13,7 +13,7 @@ from tests.api.described import try_everything
 
 CASES = 10_000
 SECONDS = 3600
-OPTIONS = ("--phases=coverage,fuzzing", "--max-examples=800", "--continue-on-failure", "--seed=6")
+OPTIONS = ("--phases=coverage,fuzzing", "--max-examples=840", "--continue-on-failure", "--seed=6")
 
 
 def main() -> None:

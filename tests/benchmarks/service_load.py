@@ -38,12 +38,21 @@ from tests.api.stores import fill
 
 BATCH = 5000
 CONNECTIONS = 32
+SETTLE_SECONDS = 8  # in which the server has warmed up and the job has begun to compute
 UNLIMITED = {"ENSEMBLE_REQUEST_RATE": "1000000/second", "ENSEMBLE_MAXIMUM_JOBS": "10000000"}
 ENDLESS = {"preset": "critical-hamaker", "set": {"search.tolerance": 1e-6}, "ranks": 1}
 POST = """
 wrk.method = "POST"
 wrk.body = '{"preset": "doublet-shear"}'
 wrk.headers["Content-Type"] = "application/json"
+"""
+ANOTHER = """
+local turn = 0
+request = function()
+  turn = turn + 1
+  local change = string.format('"set": {"flow.rate": %.6f}', 0.4 + 1e-6 * turn)
+  return wrk.format(nil, nil, nil, '{"preset": "doublet-shear", ' .. change .. '}')
+end
 """
 TO_MILLISECONDS = {"us": 1e-3, "ms": 1.0, "s": 1e3}
 
@@ -172,9 +181,11 @@ def main() -> None:
             "GET /runs/{key}": getting(*(f"/runs/{key}" for key in runs)),
             "GET /boundaries/{key}": getting(f"/boundaries/{boundary}"),
             "POST /jobs": POST,
+            "POST /jobs, each of another scene": POST + ANOTHER,
         }
         with server(store, workers=int(options.busy)) as (process, address):
             listened = httpx.post(f"{address}/jobs", json=ENDLESS).raise_for_status().json()["id"]
+            time.sleep(SETTLE_SECONDS)
             with listening(address, f"/jobs/{listened}/events", options.listeners):
                 measured = {
                     name: ask(directory, process, f"{address}/jobs", options.seconds, script)

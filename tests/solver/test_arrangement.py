@@ -190,9 +190,9 @@ def test_only_neighbors_are_compared(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def count(first: Ellipses, second: Ellipses) -> np.ndarray:
         compared.append(len(first.center))
-        return distances(first, second)
+        return clearances(first, second)
 
-    monkeypatch.setattr("solver.ellipses.distances", count)
+    monkeypatch.setattr("solver.ellipses.clearances", count)
     for side in (8, 16):
         assert overlapping_pair(Lattice(columns=side, rows=side, spacing=(2.0, 2.8)).vesicles()) is None
     assert compared[0] <= 4 * 64
