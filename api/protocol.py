@@ -7,6 +7,8 @@ from typing import Any
 
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
+_END_OF_HEAD = b"\r\n\r\n"
+
 
 class ImpatientProtocol(HttpToolsProtocol):
     """Closes a connection whose request has no complete head in time, or one that is too large.
@@ -34,6 +36,11 @@ class ImpatientProtocol(HttpToolsProtocol):
 
     def data_received(self, data: bytes) -> None:
         """Take bytes of a request."""
+        # A head that ends in these bytes is over once they are parsed, so it is measured before.
+        ending = max(data.find(_END_OF_HEAD), 0)
+        if self._head_timer is not None and self._head_received + ending > self.head_bytes:
+            self._give_up()
+            return
         super().data_received(data)
         if self._head_timer is not None:
             self._head_received += len(data)

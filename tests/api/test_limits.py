@@ -268,6 +268,8 @@ def test_a_head_without_end(store):
         endless = [b"GET /jobs HTTP/1.1\r\nHost: localhost\r\n", *[b"X: " + b"y" * 1000 + b"\r\n"] * 100]
         assert status_of(raw(client, *endless)) == 400
         assert status_of(raw(client, b"GET /" + b"y" * 100_000)) == 400
+        at_once = b"GET /jobs HTTP/1.1\r\n" + HEAD + b"X: " + b"y" * 20_000 + b"\r\n\r\n"
+        assert status_of(raw(client, at_once)) == 400
         assert client.get("/jobs").status_code == 200
 
 
