@@ -32,6 +32,9 @@ if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
 
 
+_ROUNDS = 3  # in which numbers of ranks take turns: a machine's speed changes within minutes
+
+
 def make_scaling(communicator: Intracomm, store: Store, quick: bool, tell: Tell) -> Report | None:
     """Measure on 1, 2, 4, … and all ranks, then write ``reports/scaling/`` in the store.
 
@@ -74,6 +77,8 @@ def measured(communicator: Intracomm, plan: Plan, tell: Tell) -> Scaling | None:
     for ranks in sizes[1:]:
         say(f"collectives of {ranks} ranks")
         gathered += collectives(communicator, ranks)
+    # Bound to a core, a rank sees that one alone.
+    cores = len(set().union(*communicator.allgather(os.sched_getaffinity(0))))
     if communicator.Get_rank() != 0:
         return None
     model = model_of(costs, evaluations, gathered)
@@ -83,7 +88,7 @@ def measured(communicator: Intracomm, plan: Plan, tell: Tell) -> Scaling | None:
         machine=Machine.here(),
         ranks=communicator.Get_size(),
         points=POINTS,
-        oversubscribed=communicator.Get_size() > len(os.sched_getaffinity(0)),
+        oversubscribed=communicator.Get_size() > cores,
         evaluations=evaluations,
         weak=weak,
         collectives=gathered,
@@ -131,26 +136,26 @@ def _costs(communicator: Intracomm, plan: Plan, say: Tell) -> list[Cost]:
 def _shared(
     communicator: Intracomm, vesicles: int, sizes: list[int], repeats: int, say: Tell
 ) -> list[Evaluation]:
-    found: list[Evaluation] = []
-    first: Measured | None = None
-    for ranks in sizes:
-        say(f"{vesicles} vesicles, ranks: {ranks}")
-        one = evaluation(communicator, vesicles, ranks, repeats)
-        if one is not None:
-            first = first or one
-            found.append(
-                Evaluation(
-                    vesicles=vesicles,
-                    ranks=ranks,
-                    seconds=one.seconds,
-                    efficiency=first.seconds / (ranks * one.seconds),
-                    gathers=one.gathers,
-                    gathered_bytes=one.gathered_bytes,
-                    difference=float(np.abs(one.rate - first.rate).max() / np.abs(first.rate).max()),
-                    **one.shares,
-                )
-            )
-    return found
+    fastest: dict[int, Measured] = {}
+    for _ in range(_ROUNDS):
+        for ranks in sizes:
+            say(f"{vesicles} vesicles, ranks: {ranks}")
+            one = evaluation(communicator, vesicles, ranks, repeats)
+            if one is not None and (ranks not in fastest or one.seconds < fastest[ranks].seconds):
+                fastest[ranks] = one
+    return [
+        Evaluation(
+            vesicles=vesicles,
+            ranks=ranks,
+            seconds=one.seconds,
+            efficiency=fastest[1].seconds / (ranks * one.seconds),
+            gathers=one.gathers,
+            gathered_bytes=one.gathered_bytes,
+            difference=float(np.abs(one.rate - fastest[1].rate).max() / np.abs(fastest[1].rate).max()),
+            **one.shares,
+        )
+        for ranks, one in fastest.items()
+    ]
 
 
 def _weak(communicator: Intracomm, plan: Plan, sizes: list[int], say: Tell) -> list[Weak]:
