@@ -82,21 +82,6 @@ class Jobs:
         self._directory = store / LOGS
         self._clock = clock
 
-    def submit(
-        self,
-        work: Work,
-        owner: str,
-        ranks: int,
-        seconds: float,
-        idempotency_key: str | None = None,
-        most_unfinished: int | None = None,
-    ) -> Submitted:
-        """Accept a job; it is on disk when this returns.
-
-        Parameters are those of `offer`, and what is raised is what `settled` raises.
-        """
-        return self.settled(self.offer(work, owner, ranks, seconds, idempotency_key, most_unfinished))
-
     def offer(
         self,
         work: Work,

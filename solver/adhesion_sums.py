@@ -29,20 +29,23 @@ _ENERGY = {Potential: adhesion_energy, TruncatedPotential: truncated_energy}
 _FORCE = {Potential: adhesion_force, TruncatedPotential: truncated_force}
 _HESSIAN = {Potential: adhesion_hessian, TruncatedPotential: truncated_hessian}
 
+# These three are what the sums below are written with; `overload` says what they are when compiled.
+_COMPILED_ONLY = "a kernel is chosen by the potential's type when a sum is compiled"
+
 
 def _energy(targets: Array, sources: Array, potential: AnyPotential) -> float:
-    """The potential's energy of a group; this and the next two exist compiled only."""
-    raise NotImplementedError
+    """The potential's energy of a group."""
+    raise NotImplementedError(_COMPILED_ONLY)
 
 
 def _force(targets: Array, sources: Array, potential: AnyPotential, scale: float, out: Array) -> None:
-    raise NotImplementedError
+    raise NotImplementedError(_COMPILED_ONLY)
 
 
 def _hessian(
     targets: Array, sources: Array, potential: AnyPotential, scale: float, xx: Array, xy: Array, yy: Array
 ) -> None:
-    raise NotImplementedError
+    raise NotImplementedError(_COMPILED_ONLY)
 
 
 @overload(_energy, strict=False)

@@ -18,6 +18,7 @@ from api.job import preset_work
 from api.jobs import Jobs
 from api.tables import JobRow, Table
 from ensemble.errors import BadInput
+from tests.api.accepting import accepted
 from tests.api.processes import run_python
 
 OPENING = """
@@ -37,7 +38,7 @@ jobs = Jobs(Database.open(sys.argv[1], Path(sys.argv[2])), Path(sys.argv[2]))
 work = preset_work("doublet-shear", {})
 while True:
     # One write that is whole or not there, as an answer over a socket would be.
-    os.write(1, (jobs.submit(work, "ada", 1, 60.0).job.id + "\\n").encode())
+    os.write(1, (jobs.settled(jobs.offer(work, "ada", 1, 60.0)).job.id + "\\n").encode())
 """
 
 
@@ -103,7 +104,7 @@ def test_a_database_that_cannot_be_used_is_refused_on_one_line(url, store):
 
 
 def test_a_change_that_fails_is_undone(database, jobs):
-    kept = jobs.submit(preset_work("doublet-shear", {}), "ada", 1, 60.0).job
+    kept = accepted(jobs, preset_work("doublet-shear", {}), "ada", 1, 60.0).job
 
     def change_and_fail() -> None:
         with database.begin() as connection:

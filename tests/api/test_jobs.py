@@ -33,6 +33,7 @@ from api.jobs import LEASE_SECONDS, Jobs
 from api.worker_name import own_name
 from ensemble.keys import run_key
 from ensemble.study import load_scene, load_study
+from tests.api.accepting import accepted
 
 SCENE = preset_work("doublet-shear", {})
 OTHER_SCENE = preset_work("doublet-shear", {"flow.rate": 0.7})
@@ -65,7 +66,7 @@ def jobs(database: Database, store: Path, clock: Clock) -> Jobs:
 
 
 def submit(jobs: Jobs, owner: str = "ada", work: Work = SCENE) -> Job:
-    return jobs.submit(work, owner, 1, SECONDS).job
+    return accepted(jobs, work, owner, 1, SECONDS).job
 
 
 def leased(jobs: Jobs, worker: str = "worker") -> Lease:
@@ -116,7 +117,7 @@ def test_bad_work_is_refused_with_the_field(name, changes, field):
 
 
 def test_an_accepted_job_is_what_was_asked_for(jobs, clock):
-    submitted = jobs.submit(SCENE, "ada", 2, SECONDS)
+    submitted = accepted(jobs, SCENE, "ada", 2, SECONDS)
     assert submitted.new
     job = submitted.job
     assert jobs.get(job.id) == job
@@ -131,7 +132,7 @@ def test_an_accepted_job_is_what_was_asked_for(jobs, clock):
 
 def test_one_key_makes_one_job_however_many_ask_at_once(jobs):
     with ThreadPoolExecutor(50) as pool:
-        asked = [pool.submit(jobs.submit, SCENE, "ada", 1, SECONDS, "key", 1) for _ in range(50)]
+        asked = [pool.submit(accepted, jobs, SCENE, "ada", 1, SECONDS, "key", 1) for _ in range(50)]
     answers = [answer.result() for answer in asked]
     assert sum(answer.new for answer in answers) == 1
     assert {answer.job.id for answer in answers} == {job.id for job in jobs.latest(100)}
@@ -139,31 +140,31 @@ def test_one_key_makes_one_job_however_many_ask_at_once(jobs):
 
 
 def test_a_key_belongs_to_one_request_of_one_owner(jobs):
-    first = jobs.submit(SCENE, "ada", 1, SECONDS, "key")
+    first = accepted(jobs, SCENE, "ada", 1, SECONDS, "key")
     for work, ranks, seconds in [(OTHER_SCENE, 1, SECONDS), (SCENE, 2, SECONDS), (SCENE, 1, 2 * SECONDS)]:
         with pytest.raises(IdempotencyConflict, match="key"):
-            jobs.submit(work, "ada", ranks, seconds, "key")
-    assert jobs.submit(OTHER_SCENE, "bob", 1, SECONDS, "key").new
+            accepted(jobs, work, "ada", ranks, seconds, "key")
+    assert accepted(jobs, OTHER_SCENE, "bob", 1, SECONDS, "key").new
     jobs.dismiss(first.job.id)
-    again = jobs.submit(SCENE, "ada", 1, SECONDS, "key")
+    again = accepted(jobs, SCENE, "ada", 1, SECONDS, "key")
     assert not again.new
     assert again.job.status is Status.DISMISSED
 
 
 def test_an_owner_may_have_so_many_unfinished_jobs(jobs):
     for _ in range(3):
-        jobs.submit(SCENE, "ada", 1, SECONDS, most_unfinished=3)
+        accepted(jobs, SCENE, "ada", 1, SECONDS, most_unfinished=3)
     leased(jobs)
     with pytest.raises(TooManyJobs, match="3"):
-        jobs.submit(SCENE, "ada", 1, SECONDS, most_unfinished=3)
-    assert jobs.submit(SCENE, "bob", 1, SECONDS, most_unfinished=3).new
+        accepted(jobs, SCENE, "ada", 1, SECONDS, most_unfinished=3)
+    assert accepted(jobs, SCENE, "bob", 1, SECONDS, most_unfinished=3).new
     jobs.dismiss(jobs.latest(1, owner="ada")[0].id)
-    assert jobs.submit(SCENE, "ada", 1, SECONDS, most_unfinished=3).new
+    assert accepted(jobs, SCENE, "ada", 1, SECONDS, most_unfinished=3).new
 
 
 def test_an_answer_is_repeated_even_to_an_owner_who_has_too_many(jobs):
-    first = jobs.submit(SCENE, "ada", 1, SECONDS, "key", 1)
-    assert jobs.submit(SCENE, "ada", 1, SECONDS, "key", 1).job == first.job
+    first = accepted(jobs, SCENE, "ada", 1, SECONDS, "key", 1)
+    assert accepted(jobs, SCENE, "ada", 1, SECONDS, "key", 1).job == first.job
 
 
 # Lists.

@@ -19,6 +19,7 @@ from api.jobs import Jobs
 from api.settings import Settings
 from api.worker import MAXIMUM_ATTEMPTS, Verdict, verdict
 from ensemble.store import Store
+from tests.api.accepting import accepted
 from tests.api.processes import Family, alive, wait_until, working
 
 SECONDS = 100.0
@@ -51,7 +52,7 @@ def jobs(store: Path) -> Iterator[Jobs]:
 
 
 def submit(jobs: Jobs, work: Work, ranks: int = 1, seconds: float = SECONDS) -> Job:
-    return jobs.submit(work, "ada", ranks, seconds).job
+    return accepted(jobs, work, "ada", ranks, seconds).job
 
 
 def finished(jobs: Jobs, job: Job) -> Callable[[], bool]:
