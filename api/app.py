@@ -9,15 +9,15 @@ from fastapi import FastAPI
 from prometheus_client import CollectorRegistry
 from starlette.types import Lifespan
 
-from api import problems
-from api.body import BoundedBody
-from api.description import complete
-from api.headers import SafeHeaders
-from api.metrics import JobMetrics, RequestMetrics
-from api.page import add_page
+from api.http import problems
+from api.http.body import BoundedBody
+from api.http.headers import SafeHeaders
+from api.http.metrics import JobMetrics, RequestMetrics
+from api.http.openapi import complete
+from api.http.page import add_page
+from api.http.service import Service
 from api.routes import boundaries, health, jobs, metrics, presets, runs
-from api.service import Service
-from ensemble.keys import DISTRIBUTION
+from ensemble.store.run_key import DISTRIBUTION
 
 # What any route that asks who is there, or reads what was sent, may answer with.
 REFUSALS = problems.documented(

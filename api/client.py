@@ -18,12 +18,12 @@ import numpy as np
 from httpx_sse import connect_sse
 from tenacity import retry, retry_if_exception_type, stop_after_delay, wait_exponential
 
-from api.job import Job
-from api.schemas import BoundaryDocument, CriticalValueAt, Estimate, Method, Preset
+from api.http.schemas import BoundaryDocument, CriticalValueAt, Estimate, Method, Preset
+from api.jobs.job import Job
+from ensemble.config.study import Study
 from ensemble.errors import EnsembleError
-from ensemble.record import FRAME_DIMENSIONS, RunSummary
-from ensemble.study import Study
-from solver.run import Array
+from ensemble.store.run_record import FRAME_DIMENSIONS, RunSummary
+from solver.analysis.run import Array
 from solver.scene import Scene
 
 if TYPE_CHECKING:

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from api.scope import Scope
-from ensemble.cli import DEFAULT_STORE, StorePath
+from api.auth.scope import Scope
+from ensemble.cli.main import DEFAULT_STORE, StorePath
 from ensemble.errors import BadInput
 
 if TYPE_CHECKING:
@@ -55,9 +55,9 @@ def worker(
     import sys
     import threading
 
-    from api.database import Database
-    from api.jobs import Jobs
-    from api.worker import Worker
+    from api.database.service_database import Database
+    from api.jobs.job_queue import Jobs
+    from api.worker.worker import Worker
     from ensemble.store import Store
 
     logging.basicConfig(format="%(asctime)s %(message)s")
@@ -89,8 +89,8 @@ def token(
     """Create a bearer token, which is shown this once; list what there is; or revoke one."""
     from rich.console import Console
 
-    from api.database import Database
-    from api.tokens import Tokens, tokens_table
+    from api.auth.tokens import Tokens, tokens_table
+    from api.database.service_database import Database
     from ensemble.store import Store
 
     settings = _settings(store)

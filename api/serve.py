@@ -17,20 +17,20 @@ from cachetools import TTLCache
 from fastapi import FastAPI
 
 from api.app import create_app
-from api.auth import is_loopback
-from api.database import Database
-from api.job import preset_work
-from api.jobs import Jobs
-from api.limits import RateLimits
-from api.protocol import impatient
-from api.service import Service
+from api.auth.callers import is_loopback
+from api.auth.tokens import Tokens
+from api.database.service_database import Database
+from api.http.protocol import impatient
+from api.http.rate_limits import RateLimits
+from api.http.service import Service
+from api.jobs.job import preset_work
+from api.jobs.job_queue import Jobs
+from api.jobs.submissions import Submissions
 from api.settings import Settings
-from api.submissions import Submissions
-from api.tokens import Tokens
+from ensemble.config.study import preset_names
 from ensemble.errors import BadInput
 from ensemble.store import Store
-from ensemble.store.database import Place, is_file
-from ensemble.study import preset_names
+from ensemble.store.sql_database import Place, is_file
 
 MOST_WATCHED = 1024  # jobs that are looked at together by those who listen
 THREADS = 8  # that read and write; more of them would only wait for each other
@@ -99,7 +99,7 @@ def configuration(app: FastAPI, settings: Settings, host: str, port: int) -> uvi
 
 
 def _beside_workers(service: Service, workers: int) -> Callable[[FastAPI], AbstractAsyncContextManager[None]]:
-    command = [sys.executable, "-P", "-m", "ensemble.cli", "worker", "--end-with-input"]
+    command = [sys.executable, "-P", "-m", "ensemble.cli.main", "worker", "--end-with-input"]
     command += ["--store", str(service.store.path)]
 
     @asynccontextmanager

@@ -9,8 +9,8 @@ from typing import Annotated
 from pydantic import AfterValidator, Field
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
-from ensemble.cli import DEFAULT_STORE
-from ensemble.store.database import Place, is_file, sqlite_url
+from ensemble.cli.main import DEFAULT_STORE
+from ensemble.store.sql_database import Place, is_file, sqlite_url
 
 
 def _rate(text: str) -> str:
@@ -33,7 +33,7 @@ class Settings(BaseSettings):
     model_config = SettingsConfigDict(env_prefix="ENSEMBLE_", frozen=True, extra="ignore")
 
     store: Path = DEFAULT_STORE
-    database: str | None = None  # URL of a server, as `ensemble.store.database` says
+    database: str | None = None  # URL of a server, as `ensemble.store.sql_database` says
 
     maximum_ranks: int = Field(default_factory=lambda: os.cpu_count() or 1, ge=1)  # of a job
     maximum_seconds: float = Field(24 * 3600.0, gt=0)  # that a job may run

@@ -65,7 +65,7 @@ def test_dependencies_point_one_way(package: str) -> None:
     ("module", "unwanted"),
     [
         ("solver", ["numba", "mpi4py", "h5py", "zarr", "sqlalchemy", "matplotlib"]),
-        ("solver.simulate", ["ensemble", "mpi4py", "h5py", "zarr", "sqlalchemy", "matplotlib"]),
+        ("solver.simulation.simulate", ["ensemble", "mpi4py", "h5py", "zarr", "sqlalchemy", "matplotlib"]),
     ],
 )
 def test_what_an_import_loads(module: str, unwanted: list[str]) -> None:

@@ -8,12 +8,12 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Path, Query, Request, Response
 from pydantic import FiniteFloat, TypeAdapter, ValidationError
 
-from api.auth import Reader
-from api.boundary import critical_value_at, fitted
-from api.caching import ASK_AGAIN, NOT_MODIFIED, cached, etag, written
-from api.paging import After, Limit, Where, page
-from api.problems import documented
-from api.schemas import BoundaryDocument, CriticalValueAt, Method, Page
+from api.auth.callers import Reader
+from api.http.caching import ASK_AGAIN, NOT_MODIFIED, cached, etag, written
+from api.http.paging import After, Limit, Where, page
+from api.http.problems import documented
+from api.http.schemas import BoundaryDocument, CriticalValueAt, Method, Page
+from api.results.boundary_values import critical_value_at, fitted
 from ensemble.errors import BadInput
 from ensemble.store import Record
 

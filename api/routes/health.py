@@ -7,9 +7,9 @@ from http import HTTPStatus
 from fastapi import APIRouter, Request
 from sqlalchemy.exc import SQLAlchemyError
 
-from api.problems import Problem, documented
-from api.schemas import Health
-from api.service import service_of
+from api.http.problems import Problem, documented
+from api.http.schemas import Health
+from api.http.service import service_of
 
 router = APIRouter(tags=["health"])
 

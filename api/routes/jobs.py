@@ -11,17 +11,17 @@ from fastapi import APIRouter, Header, Path, Query, Request, Response
 from fastapi.responses import PlainTextResponse
 from sse_starlette import EventSourceResponse
 
-from api.auth import Reader, Submitter
-from api.caching import written
-from api.description import reference
-from api.events import job_events
-from api.job import Job, Kind, NoSuchJob, Status, TooManyJobs
-from api.paging import Limit, page
-from api.problems import Problem, documented
-from api.schemas import Estimate, Page, Submission
-from api.scope import Scope
+from api.auth.callers import Reader, Submitter
+from api.auth.scope import Scope
+from api.http.caching import written
+from api.http.openapi import reference
+from api.http.paging import Limit, page
+from api.http.problems import Problem, documented
+from api.http.schemas import Estimate, Page, Submission
+from api.jobs.job import Job, Kind, NoSuchJob, Status, TooManyJobs
+from api.jobs.job_events import job_events
+from api.jobs.submissions import Asked, Body
 from api.settings import Settings
-from api.submissions import Asked, Body
 from ensemble.errors import BadInput
 
 router = APIRouter(tags=["jobs"])

@@ -5,12 +5,12 @@ from __future__ import annotations
 from fastapi import APIRouter
 from pydantic import TypeAdapter
 
-from api.auth import Reader
-from api.cost import estimate
-from api.job import preset_work
-from api.schemas import Page, Preset
-from ensemble.study import preset_document, preset_names
-from solver.arrangement import Arrangement
+from api.auth.callers import Reader
+from api.http.schemas import Page, Preset
+from api.jobs.cost_estimate import estimate
+from api.jobs.job import preset_work
+from ensemble.config.study import preset_document, preset_names
+from solver.scene.arrangement import Arrangement
 
 router = APIRouter(prefix="/presets", tags=["presets"])
 

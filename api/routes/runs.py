@@ -7,14 +7,14 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Request, Response
 
-from api.auth import Reader
-from api.caching import FOR_EVER, NOT_MODIFIED, cached, etag, written
-from api.frames import frames_bytes, frames_document, select_frames
-from api.paging import After, Limit, Where, page
-from api.problems import documented
-from api.schemas import FramesDocument, Page, SeriesDocument
-from api.series import series_document
-from ensemble.record import RunSummary
+from api.auth.callers import Reader
+from api.http.caching import FOR_EVER, NOT_MODIFIED, cached, etag, written
+from api.http.paging import After, Limit, Where, page
+from api.http.problems import documented
+from api.http.schemas import FramesDocument, Page, SeriesDocument
+from api.results.frames import frames_bytes, frames_document, select_frames
+from api.results.series import series_document
+from ensemble.store.run_record import RunSummary
 
 OCTETS = "application/octet-stream"
 MOST_FRAMES = 1_000_000_000

@@ -9,12 +9,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ensemble.boundary import Boundary, BoundaryPoint
 from ensemble.figures.style import BLACK, GRAY, MARKS, STYLE, WIDTH
 from ensemble.figures.symbols import Quantity, describe, quantity
-from ensemble.line import Line, line_through
-from ensemble.search import Status
-from solver.run import Array, Outcome
+from ensemble.search.boundary import Boundary, BoundaryPoint
+from ensemble.search.critical_value import Status
+from ensemble.search.line import Line, line_through
+from solver.analysis.run import Array, Outcome
 from solver.scene import Scene
 
 

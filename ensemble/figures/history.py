@@ -13,8 +13,8 @@ from ensemble.figures.membranes import choose_snapshots, draw_membranes, extensi
 from ensemble.figures.panels import PANELS
 from ensemble.figures.style import GRAY, STYLE, WIDTH
 from ensemble.figures.symbols import describe
-from solver.contacts import CONTACT
-from solver.run import Array, Run
+from solver.analysis.contacts import CONTACT
+from solver.analysis.run import Array, Run
 
 # Heights in inches.
 _PANEL = 1.8

@@ -12,10 +12,10 @@ from matplotlib.colors import Normalize
 from numpy.typing import NDArray
 
 from ensemble.figures.style import CLUSTER_COLORS, PALE, TENSION_COLORS
-from solver.curve import positions
-from solver.run import Array, Frames
+from solver.analysis.run import Array, Frames
+from solver.membrane.curve import positions
+from solver.membrane.spectral import interpolation
 from solver.scene import Scene
-from solver.spectral import interpolation
 
 FEW = 4  # vesicles, up to which they are drawn large enough for many snapshots and thick lines
 _SEGMENTS = 128  # of a drawn membrane, at least: a polygon of 64 sides shows its corners in print

@@ -23,8 +23,8 @@ from ensemble.figures.output import appearing
 from ensemble.figures.panels import PANELS
 from ensemble.figures.style import GRAY, INSIDE, STYLE, TENSION_COLORS, VERMILLION
 from ensemble.figures.symbols import describe
-from solver.flow import velocity_gradient
-from solver.run import Array, Frames, Run
+from solver.analysis.run import Array, Frames, Run
+from solver.flows.imposed import velocity_gradient
 
 _PACE = 8.0  # units of time a second: a doublet at shear rate 0.5 takes about five seconds a turn
 _DURATION = (5.0, 20.0)  # seconds, at least and at most

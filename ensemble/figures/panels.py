@@ -11,7 +11,7 @@ from matplotlib.ticker import MultipleLocator
 
 from ensemble.figures.style import BLACK, BLUE, GRAY, GREEN, VERMILLION
 from ensemble.figures.symbols import DISTANCE
-from solver.run import Run
+from solver.analysis.run import Run
 
 _ANGLE_STEPS = (1, 2, 5, 10, 15, 30, 45, 90, 180, 360, 720)  # degrees between ticks
 _MOST_TICKS = 5

@@ -9,7 +9,7 @@ import matplotlib
 import numpy as np
 from matplotlib.colors import ListedColormap
 
-from solver.run import Outcome
+from solver.analysis.run import Outcome
 
 WIDTH: Final = 7.2  # inches, the text width of a two-column journal
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from ensemble.keys import run_key
-from ensemble.report.document import Document
+from ensemble.config.study import load_scene, load_study
 from ensemble.report.methods import Method, Plan
+from ensemble.report.report_model import Document
 from ensemble.report.runs import Runs
-from ensemble.study import load_scene, load_study
-from solver.run import Outcome
+from ensemble.store.run_key import run_key
+from solver.analysis.run import Outcome
 from solver.scene import Scene
 
 SCENE = "doublet-shear"  # presets

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from ensemble.report.document import Document
 from ensemble.report.measurement import Measurement
 from ensemble.report.methods import deferred_correction, usual
+from ensemble.report.report_model import Document
 from solver.scene import Scene
 
 ERRORS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)

@@ -24,7 +24,7 @@ from solver.scene import (
     Trap,
     Vesicle,
 )
-from solver.shapes import semi_axes
+from solver.scene.ellipses import semi_axes
 
 WORK_LIMIT = 40_000  # evaluations
 SAMPLES = 200  # of the diagnostics in a run

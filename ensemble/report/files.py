@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from ensemble.figures import save
 from ensemble.report import ReportName
-from ensemble.report.document import Document
+from ensemble.report.report_model import Document
 from ensemble.store import Store
 
 _REPORTS = "reports"  # directory in the store

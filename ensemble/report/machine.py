@@ -6,8 +6,8 @@ import platform
 from importlib.metadata import version
 from pathlib import Path
 
-from ensemble.record import RESULT_PACKAGES
-from ensemble.report.document import Document
+from ensemble.report.report_model import Document
+from ensemble.store.run_record import RESULT_PACKAGES
 
 
 class Machine(Document):

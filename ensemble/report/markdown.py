@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ensemble.report.answers import SHEAR_RATE
-from ensemble.report.document import Document
 from ensemble.report.machine import Machine
+from ensemble.report.report_model import Document
 from ensemble.report.stability import Stability, Verdict
 from ensemble.report.work_precision import FLOOR, WorkPrecision
 

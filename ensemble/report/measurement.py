@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ensemble.report.document import Document
+from ensemble.report.report_model import Document
 
 
 class Measurement(Document):

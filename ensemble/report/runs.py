@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from ensemble.keys import run_key
-from ensemble.record import RunSummary
-from ensemble.report.progress import Tell
+from ensemble.report.report_progress import Tell
 from ensemble.store import Store
-from solver.run import Run
+from ensemble.store.run_key import run_key
+from ensemble.store.run_record import RunSummary
+from solver.analysis.run import Run
 from solver.scene import Scene, Start
-from solver.simulate import simulate
+from solver.simulation.simulate import simulate
 
 _WARM_UP = 50  # evaluations
 

@@ -1,6 +1,6 @@
 """How far apart two shapes are, whichever way their points are spread along them.
 
-Points glide along a membrane by a choice that has no physics in it (`solver.gliding`), and it depends on
+Points glide along a membrane by a choice that has no physics in it (`solver.membrane.tangential_velocity`), and it depends on
 step size and resolution.  Two runs that agree on every membrane may therefore disagree on every point, so
 runs are compared as shapes: each membrane is a closed curve, interpolated trigonometrically through its
 points, and the error at a point is its distance to the curve of the other run.
@@ -11,8 +11,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from solver import curve
-from solver.run import Run
+from solver.analysis.run import Run
+from solver.membrane import curve
 
 Array = NDArray[np.float64]
 

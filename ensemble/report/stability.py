@@ -8,11 +8,11 @@ from enum import StrEnum
 
 import numpy as np
 
-from ensemble.keys import run_key
-from ensemble.report.document import Document
 from ensemble.report.machine import Machine
+from ensemble.report.report_model import Document
 from ensemble.report.runs import Runs
-from solver.run import LARGEST_SPATIAL, Outcome, Run
+from ensemble.store.run_key import run_key
+from solver.analysis.run import LARGEST_SPATIAL, Outcome, Run
 from solver.scene import Scene
 
 QUICK_WORK_LIMIT = 3_000  # evaluations

@@ -7,16 +7,16 @@ from itertools import groupby
 
 import numpy as np
 
-from ensemble.keys import run_key
 from ensemble.report.answers import Answer, Critical, answers, critical_values
-from ensemble.report.document import Document
 from ensemble.report.envelope import Envelope, envelopes
 from ensemble.report.machine import Machine
 from ensemble.report.measurement import Measurement
 from ensemble.report.methods import Method, Plan
+from ensemble.report.report_model import Document
 from ensemble.report.runs import Runs
 from ensemble.report.shape import final_membranes, shape_distance
-from solver.run import Array, Outcome, Run
+from ensemble.store.run_key import run_key
+from solver.analysis.run import Array, Outcome, Run
 from solver.scene import Scene
 
 # A fit leaves out what lies within this factor of the least error at the same number of points, where the

@@ -7,7 +7,7 @@ what it left behind is swept.  One lock file, held only for moments, keeps sweep
 """
 
 from ensemble.store.catalog import Record
-from ensemble.store.errors import NotStored, StoreError, StoreInputError
 from ensemble.store.store import Staged, Store
+from ensemble.store.store_errors import NotStored, StoreError, StoreInputError
 
 __all__ = ["NotStored", "Record", "Staged", "Store", "StoreError", "StoreInputError"]

@@ -9,10 +9,10 @@ from sqlalchemy import JSON, Executable, Text, bindparam, cast, delete, insert, 
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 from sqlalchemy.schema import CreateSchema
 
-from ensemble.boundary import Boundary
-from ensemble.record import RunSummary
-from ensemble.store.database import Place, engine
+from ensemble.search.boundary import Boundary
 from ensemble.store.filters import conditions, model_fields
+from ensemble.store.run_record import RunSummary
+from ensemble.store.sql_database import Place, engine
 from ensemble.timestamp import timestamp_text
 from solver.scene import Scene
 

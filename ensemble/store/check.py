@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from ensemble.keys import DISTRIBUTION, run_key
-from ensemble.record import RunSummary
 from ensemble.store.archive import read_run, read_summary
-from ensemble.store.errors import StoreError
-from solver.run import Outcome, Run
+from ensemble.store.run_key import DISTRIBUTION, run_key
+from ensemble.store.run_record import RunSummary
+from ensemble.store.store_errors import StoreError
+from solver.analysis.run import Outcome, Run
 
 
 def check_run(directory: Path, summary: RunSummary) -> list[str]:

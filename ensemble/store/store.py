@@ -18,14 +18,14 @@ from typing import Self
 from pydantic import ValidationError
 from sqlalchemy.exc import DatabaseError
 
-from ensemble.boundary import Boundary
-from ensemble.disk import flush, flush_tree, locked
-from ensemble.record import RunSummary
+from ensemble.search.boundary import Boundary
 from ensemble.store.catalog import Catalog, Record
-from ensemble.store.database import CATALOG, PLACE, UNUSABLE, Place, reason
-from ensemble.store.errors import NotStored, StoreInputError
+from ensemble.store.disk import flush, flush_tree, locked
+from ensemble.store.run_record import RunSummary
+from ensemble.store.sql_database import CATALOG, PLACE, UNUSABLE, Place, reason
 from ensemble.store.staging import Writer, abandoned
-from solver.run import Outcome, Run
+from ensemble.store.store_errors import NotStored, StoreInputError
+from solver.analysis.run import Outcome, Run
 
 LOCK = "store.lock"
 RUNS = "runs"
@@ -70,7 +70,7 @@ class Store(AbstractContextManager["Store"]):
     def open(cls, path: Path) -> Self:
         """Open a store to write to: create it if there is none, and sweep it.
 
-        A new one has its catalog in a file, or on the server that `ensemble.store.database` tells of.
+        A new one has its catalog in a file, or on the server that `ensemble.store.sql_database` tells of.
 
         Raises
         ------

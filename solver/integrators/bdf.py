@@ -16,7 +16,7 @@ from scipy.integrate import BDF
 from scipy.sparse import csc_array
 
 from solver.integrators.base import Step, StepFailedError
-from solver.integrators.blocks import BlockDiagonal
+from solver.motion.block_diagonal import BlockDiagonal
 
 Array = NDArray[np.float64]
 

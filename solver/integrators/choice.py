@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from solver.integrators.base import Integrator
 from solver.integrators.bdf import BackwardDifferentiation, BlockBackwardDifferentiation
-from solver.integrators.blocks import BlockDiagonal
 from solver.integrators.control import AdaptiveStep, ConservedError, EmbeddedError, ErrorMeasure
 from solver.integrators.one_step import OneStepIntegrator, OneStepMethod
 from solver.integrators.rodas5p import RODAS5P
 from solver.integrators.rosenbrock import Rosenbrock
 from solver.integrators.sdc import DeferredCorrection, estimate_power
+from solver.motion.block_diagonal import BlockDiagonal
 from solver.scene import Numerics
 
 Array = NDArray[np.float64]

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy.linalg import lu_factor, lu_solve
 
 from solver.integrators.base import Step, StepFailedError
-from solver.integrators.blocks import BlockDiagonal
 from solver.integrators.control import Attempt, StepControl, root_mean_square
+from solver.motion.block_diagonal import BlockDiagonal
 
 Array = NDArray[np.float64]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from api.jobs import Jobs, Submitted
+from api.jobs.job_queue import Jobs, Submitted
 
 
 def accepted(jobs: Jobs, *offer: Any, **fields: Any) -> Submitted:

@@ -8,8 +8,8 @@ from pathlib import Path
 import httpx
 import pytest
 
-from api.database import Database
-from api.jobs import Jobs
+from api.database.service_database import Database
+from api.jobs.job_queue import Jobs
 from api.settings import Settings
 from ensemble.store import Store
 from tests import postgresql

@@ -8,7 +8,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from api.scope import Scope
+from api.auth.scope import Scope
 from ensemble.store import Store
 from tests.api.servers import make_token, serving
 from tests.api.stores import fill

@@ -50,7 +50,7 @@ class Family:
     def __init__(self, store: Path, *options: str) -> None:
         self._mark = uuid4().hex
         self.worker = subprocess.Popen(
-            [sys.executable, "-m", "ensemble.cli", "worker", "--store", str(store), *options],
+            [sys.executable, "-m", "ensemble.cli.main", "worker", "--store", str(store), *options],
             env=os.environ | {MARK: self._mark},
             stdin=subprocess.PIPE,
         )
@@ -75,7 +75,7 @@ class Family:
 
     def watcher(self) -> psutil.Process:
         """The process between the worker and the launcher."""
-        return self._first(lambda process: "api.watcher" in process.cmdline())
+        return self._first(lambda process: "api.worker.watcher" in process.cmdline())
 
     def rank(self, number: int) -> psutil.Process:
         """One of the processes that simulate."""

@@ -14,11 +14,11 @@ import httpx
 import uvicorn
 
 from api.app import create_app
-from api.database import Database
-from api.scope import Scope
+from api.auth.scope import Scope
+from api.auth.tokens import Tokens
+from api.database.service_database import Database
 from api.serve import configuration, opened
 from api.settings import Settings
-from api.tokens import Tokens
 
 SECONDS_TO_START = 20
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from datetime import UTC, datetime
 from pathlib import Path
 
-from ensemble.boundary import Boundary, BoundaryPoint
+from ensemble.config.study import load_study
+from ensemble.search.boundary import Boundary, BoundaryPoint
 from ensemble.store import Store
-from ensemble.study import load_study
-from solver.run import Outcome
+from solver.analysis.run import Outcome
 from tests.ensemble.runs import failed_run, shear_run, shear_scene
 
 RATES = (0.5, 0.625, 0.75, 0.875, 1.0)

@@ -12,13 +12,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from api.auth.scope import Scope
 from api.client import Client, Refused
-from api.job import Job, Status
-from api.scope import Scope
+from api.jobs.job import Job, Status
+from ensemble.config.study import load_scene, load_study
 from ensemble.store import Store
-from ensemble.study import load_scene, load_study
-from solver.curve import positions
-from solver.run import Outcome
+from solver.analysis.run import Outcome
+from solver.membrane.curve import positions
 from tests.api.processes import working
 from tests.api.servers import make_token, serving
 from tests.api.services import service, start_service

@@ -13,12 +13,12 @@ import httpx
 import pytest
 from playwright.sync_api import Browser, ConsoleMessage, Page, expect, sync_playwright
 
-from api.scope import Scope
-from ensemble.boundary import Boundary
-from ensemble.keys import run_key
+from api.auth.scope import Scope
+from ensemble.config.study import load_study
+from ensemble.search.boundary import Boundary
 from ensemble.store import Store
-from ensemble.study import load_study
-from solver.run import Outcome, Run
+from ensemble.store.run_key import run_key
+from solver.analysis.run import Outcome, Run
 from tests.api.processes import wait_until
 from tests.api.servers import make_token, serving
 from tests.api.services import service, start_service

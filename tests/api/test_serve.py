@@ -18,10 +18,10 @@ import httpx
 import psutil
 import pytest
 
-from api.scope import Scope
+from api.auth.scope import Scope
 from tests.api.servers import make_token
 
-SERVE = (sys.executable, "-m", "ensemble.cli", "serve")
+SERVE = (sys.executable, "-m", "ensemble.cli.main", "serve")
 SECONDS = 60
 SECONDS_TO_DIE = 5
 

@@ -22,10 +22,10 @@ from numba import njit
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from ensemble.study import load_scene
-from solver.direct_sum import velocity
-from solver.dynamics import Dynamics
-from solver.simulate import simulate
+from ensemble.config.study import load_scene
+from solver.motion.dense import Dynamics
+from solver.potentials.direct_sum import velocity
+from solver.simulation.simulate import simulate
 
 Array = NDArray[np.float64]
 Sum = Callable[[Array, Array, Array], Array]

@@ -28,9 +28,9 @@ from uuid import uuid4
 import httpx
 import psutil
 
-from api.database import Database
-from api.job import Job, Status
-from api.jobs import Jobs
+from api.database.service_database import Database
+from api.jobs.job import Job, Status
+from api.jobs.job_queue import Jobs
 from api.settings import Settings
 from ensemble.store import Store
 from tests.api.processes import alive
@@ -48,7 +48,14 @@ class Service:
     def __init__(self, store: Path, port: int) -> None:
         self.mark = uuid4().hex
         self.address = f"http://127.0.0.1:{port}"
-        self._command = [sys.executable, "-m", "ensemble.cli", "serve", f"--port={port}", f"--store={store}"]
+        self._command = [
+            sys.executable,
+            "-m",
+            "ensemble.cli.main",
+            "serve",
+            f"--port={port}",
+            f"--store={store}",
+        ]
         self._log = (store.parent / "service.log").open("ab")
         self.start()
 
@@ -85,11 +92,11 @@ def _plays(process: psutil.Process, part: str) -> bool:
     except psutil.Error:
         return False
     if part == "rank":
-        return environment.get("PMI_RANK") == "0" and "api.background" in command
+        return environment.get("PMI_RANK") == "0" and "api.worker.background" in command
     if part == "mpirun":
         return process.name().startswith("mpi")
     words = [word for word in command if word != "-P"]
-    return words[1:4] == ["-m", "ensemble.cli", {"server": "serve", "worker": "worker"}[part]]
+    return words[1:4] == ["-m", "ensemble.cli.main", {"server": "serve", "worker": "worker"}[part]]
 
 
 class Load:

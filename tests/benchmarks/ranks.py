@@ -21,11 +21,11 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from solver.equation import equation_of_motion
+from solver.motion.equation import equation_of_motion
 from solver.parallel import SERIAL, Parallel, Ranks
 from solver.scene import Scene
-from solver.simulate import simulate
-from solver.start import placed_state
+from solver.simulation.initial_state import placed_state
+from solver.simulation.simulate import simulate
 
 Array = NDArray[np.float64]
 

@@ -28,11 +28,11 @@ import httpx
 import psutil
 from sqlalchemy import insert
 
-from api.database import Database
-from api.job import Status, preset_work
-from api.jobs import Jobs
+from api.database.database_tables import JobRow
+from api.database.service_database import Database
+from api.jobs.job import Status, preset_work
+from api.jobs.job_queue import Jobs
 from api.settings import Settings
-from api.tables import JobRow
 from ensemble.store import Store
 from tests.api.stores import fill
 
@@ -79,7 +79,7 @@ def fill_queue(store: Path, count: int) -> list[str]:
 def server(store: Path, workers: int) -> Iterator[tuple[psutil.Process, str]]:
     """Start a server process; gives it and its address."""
     said = store.with_name("said")
-    command = [sys.executable, "-m", "ensemble.cli", "serve", "--port=0", f"--workers={workers}"]
+    command = [sys.executable, "-m", "ensemble.cli.main", "serve", "--port=0", f"--workers={workers}"]
     with said.open("wb") as log:
         process = subprocess.Popen(
             [*command, f"--store={store}"], stdout=log, stderr=log, env=os.environ | UNLIMITED

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from solver.run import Energy, Errors, Frames, Outcome, Run, Work
+from solver.analysis.run import Energy, Errors, Frames, Outcome, Run, Work
 from solver.scene import Scene
 
 POINTS = 64

@@ -6,7 +6,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 
-from solver.run import Energy, Errors, Frames, Outcome, Run, Viscosity, Work
+from solver.analysis.run import Energy, Errors, Frames, Outcome, Run, Viscosity, Work
 from solver.scene import Adhesion, Numerics, Scene, Shear, Vesicle
 
 

@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ensemble.mpi import abort_guard, world
-from solver.dynamics import Dynamics
+from ensemble.mpi.world import abort_guard, world
+from solver.analysis.run import Run
+from solver.motion.dense import Dynamics
+from solver.motion.summed import Suspension
 from solver.parallel import SERIAL, Parallel, Ranks
-from solver.run import Run
 from solver.scene import LARGEST_DENSE, Adhesion, Numerics, Scene, Shear, Trap, Vesicle
-from solver.simulate import simulate
-from solver.start import placed_state
-from solver.suspension import Suspension
+from solver.simulation.initial_state import placed_state
+from solver.simulation.simulate import simulate
 from tests.solver.scenes import shear_pair, uneven_pair
 from tests.solver.suspensions import suspension
 

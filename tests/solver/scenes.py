@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.geometry import Geometry, Membranes
+from solver.membrane.geometry import Geometry, Membranes
 from solver.scene import Adhesion, Criteria, Scene, Shear, Vesicle
-from solver.start import placed_state
+from solver.simulation.initial_state import placed_state
 
 Array = NDArray[np.float64]
 

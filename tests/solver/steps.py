@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from solver.dynamics import Dynamics
 from solver.integrators import BackwardDifferentiation, Integrator, Step
 from solver.integrators.control import FixedStep, root_mean_square
 from solver.integrators.one_step import OneStepIntegrator, OneStepMethod
+from solver.motion.dense import Dynamics
 from solver.scene import Numerics
-from solver.start import placed_state
+from solver.simulation.initial_state import placed_state
 from tests.solver.scenes import shear_pair
 
 Array = NDArray[np.float64]

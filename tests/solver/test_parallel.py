@@ -14,9 +14,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from solver.outcome import Outcome
+from solver.analysis.outcome import Outcome
 from solver.parallel import SERIAL, even_bounds
-from solver.simulate import simulate
+from solver.simulation.simulate import simulate
 from tests.solver.ranks import DOUBLET, computed
 
 Array = NDArray[np.float64]
@@ -68,7 +68,7 @@ def test_the_doublet_that_is_compared_is_bound(serial: dict[str, Array]) -> None
 
 MORE_RANKS_THAN_ROWS = """
 import numpy as np
-from ensemble.mpi import abort_guard, world
+from ensemble.mpi.world import abort_guard, world
 from solver.parallel import Ranks
 communicator = world()
 with abort_guard(communicator):
@@ -81,9 +81,9 @@ print("right", end=" ")
 FAILING = """
 import sys
 from itertools import pairwise
-from ensemble.mpi import abort_guard, world
+from ensemble.mpi.world import abort_guard, world
 from solver.parallel import Ranks
-from solver.simulate import simulate
+from solver.simulation.simulate import simulate
 from tests.solver.ranks import DOUBLET
 communicator = world()
 with abort_guard(communicator):
@@ -94,9 +94,9 @@ with abort_guard(communicator):
 """
 
 CANCELLED = """
-from ensemble.mpi import abort_guard, world
+from ensemble.mpi.world import abort_guard, world
 from solver.parallel import Ranks
-from solver.simulate import Cancelled, simulate
+from solver.simulation.simulate import Cancelled, simulate
 from tests.solver.ranks import DOUBLET
 communicator = world()
 with abort_guard(communicator):
@@ -112,9 +112,9 @@ with abort_guard(communicator):
 
 
 DIFFERING = """
-from ensemble.mpi import abort_guard, world
+from ensemble.mpi.world import abort_guard, world
 from solver.parallel import Ranks
-from solver.simulate import simulate
+from solver.simulation.simulate import simulate
 from tests.solver.ranks import DOUBLET
 communicator = world()
 with abort_guard(communicator):
@@ -125,11 +125,11 @@ with abort_guard(communicator):
 
 DISTORTED = """
 import numpy as np
-from ensemble.mpi import abort_guard, world
-from solver.equation import equation_of_motion
+from ensemble.mpi.world import abort_guard, world
+from solver.motion.equation import equation_of_motion
 from solver.parallel import Ranks
-from solver.start import placed_state
-from solver.tension import TensionNotFoundError
+from solver.simulation.initial_state import placed_state
+from solver.forces.tension import TensionNotFoundError
 from tests.solver.suspensions import suspension
 communicator = world()
 with abort_guard(communicator):

@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 
 from ensemble.figures.style import BLACK, GRAY, MARKS, STYLE, WIDTH
 from ensemble.figures.symbols import DISTANCE, SHEAR_RATE
-from ensemble.report.paper.fit import Line
-from solver.run import Outcome
+from ensemble.report.paper.power_laws import Line
+from solver.analysis.run import Outcome
 
 _CRITICAL = r"\mathcal{H}_c"
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from pydantic import Field
 
-from ensemble.report.document import Document
 from ensemble.report.paper.case import Case, StudyCase
+from ensemble.report.report_model import Document
 
 Value = float | tuple[float, float] | str | None
 Bracket = tuple[float, float]

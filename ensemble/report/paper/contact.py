@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.dynamics import Dynamics
-from solver.resolution import with_points
-from solver.run import Array, Run
+from solver.analysis.run import Array, Run
+from solver.motion.dense import Dynamics
+from solver.simulation.resolution import with_points
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from ensemble.report.paper.case import StudyCase
 from ensemble.report.paper.comparison import Bracket, Row, bracket, number
 from ensemble.report.paper.results import Results
 from ensemble.report.paper.section import Chapter, Course, Drawing, Plan, Section
-from solver.shapes import semi_axes
+from solver.scene.ellipses import semi_axes
 
 _CONTRAST: Final = quantity("vesicles.viscosity_contrast", "shear")
 _AREA: Final = quantity("vesicles.reduced_area", "shear")

@@ -9,17 +9,17 @@ from typing import Final, NamedTuple
 import numpy as np
 from scipy.optimize import linprog
 
-from ensemble.parameters import parameter_value
+from ensemble.config.parameters import parameter_value
 from ensemble.report.paper import boundary_figures
 from ensemble.report.paper.boundary_figures import Diagram
 from ensemble.report.paper.case import StudyCase
 from ensemble.report.paper.comparison import Bracket, Row, bracket, number, words
-from ensemble.report.paper.fit import Line, straight_line
+from ensemble.report.paper.power_laws import Line, straight_line
 from ensemble.report.paper.published import published
 from ensemble.report.paper.results import Results
 from ensemble.report.paper.section import Chapter, Course, Drawing, Plan, Section
 from ensemble.report.paper.shear_doublet import Doublet
-from solver.run import Outcome, Run
+from solver.analysis.run import Outcome, Run
 from solver.scene import Scene
 
 _PRESETS: Final = {0.4: "critical-hamaker", 0.1: "critical-hamaker-short-range"}  # by separation distance

@@ -15,7 +15,7 @@ from ensemble.figures.membranes import membrane_segments
 from ensemble.figures.style import BLUE, GRAY, GREEN, ORANGE, STYLE, TENSION_COLORS, VERMILLION, WIDTH
 from ensemble.report.paper.contact import Contact
 from ensemble.report.paper.published import published
-from solver.run import Run
+from solver.analysis.run import Run
 
 if TYPE_CHECKING:
     from ensemble.report.paper.doublets import Energies

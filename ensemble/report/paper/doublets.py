@@ -12,7 +12,7 @@ from ensemble.report.paper import doublet_figures
 from ensemble.report.paper.case import Case
 from ensemble.report.paper.comparison import Row, number, words
 from ensemble.report.paper.contact import Contact, contact_of
-from ensemble.report.paper.fit import power_law
+from ensemble.report.paper.power_laws import power_law
 from ensemble.report.paper.published import published
 from ensemble.report.paper.results import Results
 from ensemble.report.paper.section import Chapter, Course, Drawing, Plan, Section

@@ -14,10 +14,10 @@ from matplotlib.ticker import LogLocator, NullFormatter
 from ensemble.figures.style import BLUE, GRAY, GREEN, ORANGE, PURPLE, STYLE, VERMILLION, WIDTH
 from ensemble.report.paper.case import Case
 from ensemble.report.paper.comparison import Row, number
-from ensemble.report.paper.fit import PowerLaw, power_law
+from ensemble.report.paper.power_laws import PowerLaw, power_law
 from ensemble.report.paper.published import published
 from ensemble.report.paper.section import Chapter, Course, Drawing, Plan, Section
-from solver.run import Run
+from solver.analysis.run import Run
 
 _HAMAKER, _DISTANCE = 0.1, 0.4  # where the other of the two is varied
 _HAMAKERS = (0.1, 0.2, 0.3, 0.4, 0.5)

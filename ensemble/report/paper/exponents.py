@@ -9,12 +9,12 @@ import matplotlib
 from matplotlib.figure import Figure
 
 from ensemble.figures.style import BLUE, GREEN, STYLE, VERMILLION, WIDTH
-from ensemble.record import RunSummary
 from ensemble.report.paper.case import Case
 from ensemble.report.paper.comparison import Row, number, words
 from ensemble.report.paper.results import Results
 from ensemble.report.paper.section import Chapter, Course, Drawing, Plan, Section
-from solver.run import Outcome
+from ensemble.store.run_record import RunSummary
+from solver.analysis.run import Outcome
 
 _USUAL, _STEEP = (4, 2), (8, 6)
 _HAMAKER = 1.5

@@ -15,7 +15,7 @@ from ensemble.report.paper.comparison import Row, bracket, number, words
 from ensemble.report.paper.filmstrip import filmstrip
 from ensemble.report.paper.results import Results
 from ensemble.report.paper.section import Chapter, Course, Drawing, Plan, Section
-from solver.run import Run
+from solver.analysis.run import Run
 
 
 class _Meeting(NamedTuple):

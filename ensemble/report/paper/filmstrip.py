@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from ensemble.figures.membranes import membrane_segments
 from ensemble.figures.style import BLACK, STYLE, TENSION_COLORS, WIDTH
-from solver.run import Run
+from solver.analysis.run import Run
 
 _QUANTILES = (0.02, 0.98)  # of the tensions after the start: an ellipse that has not relaxed exceeds them far
 

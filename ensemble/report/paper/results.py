@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from ensemble.boundary import Boundary, BoundaryPoint
-from ensemble.record import RunSummary
 from ensemble.report.paper.case import Case, StudyCase
 from ensemble.report.paper.comparison import Bracket
+from ensemble.search.boundary import Boundary, BoundaryPoint
 from ensemble.store import Store
-from solver.run import Outcome, Run
+from ensemble.store.run_record import RunSummary
+from solver.analysis.run import Outcome, Run
 
 
 class Results:

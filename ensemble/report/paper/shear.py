@@ -15,7 +15,7 @@ from ensemble.report.paper.results import Results
 from ensemble.report.paper.section import Chapter, Course, Drawing, Plan, Section
 from ensemble.report.paper.shear_doublet import Doublet, period
 from ensemble.report.paper.shear_figures import Curve
-from solver.run import Run
+from solver.analysis.run import Run
 
 _WEAK, _STRONG = 0.7, 2.1  # Hamaker constants of the published snapshots; their periods are nearly the same
 _SHOWN_TIMES = tuple(float(time) for time in range(0, 60, 6))

@@ -13,7 +13,7 @@ from ensemble.figures.style import BLUE, GRAY, GREEN, ORANGE, PURPLE, STYLE, VER
 from ensemble.figures.symbols import DISTANCE, SHEAR_RATE
 from ensemble.report.paper.published import published
 from ensemble.report.paper.shear_doublet import Doublet
-from solver.run import Outcome, Run
+from solver.analysis.run import Outcome, Run
 
 _COLORS = (BLUE, GREEN, ORANGE, PURPLE)
 _H = r"\mathcal{H}"

@@ -9,7 +9,6 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from ensemble.boundary import BoundaryPoint
 from ensemble.figures.style import (
     BLACK,
     BLUE,
@@ -23,9 +22,10 @@ from ensemble.figures.style import (
     VERMILLION,
     WIDTH,
 )
-from ensemble.record import RunSummary
 from ensemble.report.paper.published import published
-from solver.run import Outcome, Run
+from ensemble.search.boundary import BoundaryPoint
+from ensemble.store.run_record import RunSummary
+from solver.analysis.run import Outcome, Run
 from solver.scene import Trap
 
 _COLORS = (BLUE, GREEN, ORANGE, VERMILLION, PURPLE, SKY, BLACK)

@@ -18,7 +18,7 @@ from ensemble.report.paper.case import Case, StudyCase
 from ensemble.report.paper.comparison import Row, bracket, words
 from ensemble.report.paper.results import Results
 from ensemble.report.paper.section import Chapter, Course, Drawing, Plan, Section
-from solver.run import Run
+from solver.analysis.run import Run
 
 _BY_AREA = "critical-hamaker-reduced-area"
 _QUICK: Final = {"sweep.values": [0.8, 0.9], "search.tolerance": 0.05}

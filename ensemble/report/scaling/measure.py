@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ensemble.groups import split
+from ensemble.mpi.groups import split
 from ensemble.report.scaling.counting import Counted
-from ensemble.report.scaling.document import Collective
-from ensemble.report.scaling.plan import suspension
 from ensemble.report.scaling.profile import shares_of_time
-from solver.direct_sum import velocity
-from solver.equation import equation_of_motion
+from ensemble.report.scaling.scaling_document import Collective
+from ensemble.report.scaling.scaling_plan import suspension
+from solver.motion.equation import equation_of_motion
 from solver.parallel import SERIAL, Array, Ranks
-from solver.start import placed_state
+from solver.potentials.direct_sum import velocity
+from solver.simulation.initial_state import placed_state
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
@@ -31,7 +31,7 @@ _MEASUREMENTS = 20
 
 
 class Measured(NamedTuple):
-    """An evaluation as `ensemble.report.scaling.document.Evaluation` has it, and its result."""
+    """An evaluation as `ensemble.report.scaling.scaling_document.Evaluation` has it, and its result."""
 
     seconds: float
     shares: dict[str, float]

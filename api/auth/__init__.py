@@ -1,0 +1,1 @@
+"""Tokens, their scopes, and who is asking."""

@@ -1,0 +1,1 @@
+"""The database of the service: SQLite in the store, or PostgreSQL by its URL."""

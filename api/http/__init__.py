@@ -1,0 +1,1 @@
+"""What every request passes through, and the shape of every answer."""

@@ -1,0 +1,1 @@
+"""Jobs: submissions, their limits and cost, and the queue that workers lease from."""

@@ -1,0 +1,1 @@
+"""Stored runs and boundaries as a client reads them."""

@@ -1,0 +1,1 @@
+"""The worker: leases jobs and carries each out with one `mpirun`."""

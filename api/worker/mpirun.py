@@ -1,0 +1,117 @@
+"""One `mpirun` with everything it starts, and what it says."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import threading
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import IO, TextIO
+
+from pydantic import ValidationError
+
+from ensemble.cli.progress import ProgressLine
+from ensemble.errors import BadInput
+
+_END_SECONDS = 5.0
+
+
+def mpirun_command(ranks: int, arguments: Sequence[str]) -> list[str]:
+    """Return the command that runs `ensemble` with these arguments on so many ranks, at low priority.
+
+    Raises
+    ------
+    BadInput
+        If there is no `mpirun`.
+    """
+    beside = Path(sys.executable).with_name("mpirun")
+    mpirun = str(beside) if beside.exists() else shutil.which("mpirun")
+    if mpirun is None:
+        raise BadInput("mpirun: there is none on the PATH (the extra 'mpich' brings one)")
+    # -P: a folder of a package's name where the service was started must not take its place.
+    return [mpirun, "-n", str(ranks), sys.executable, "-P", "-m", "api.worker.background", *arguments]
+
+
+class Process(AbstractContextManager["Process"]):
+    """A command in its own session; neither it nor a descendant of it outlives this process.
+
+    Use it as a context manager; leaving the block ends what is left.
+
+    Parameters
+    ----------
+    command : sequence of str
+    log : Path
+        To which is appended what it says on standard error.
+    """
+
+    def __init__(self, command: Sequence[str], log: Path) -> None:
+        self.progress = ProgressLine(fraction=0.0, message="starting")
+        self.last_words = ""
+        self._output: IO[str] = tempfile.TemporaryFile("w+", encoding="utf-8")  # noqa: SIM115
+        self._watcher = subprocess.Popen(
+            [sys.executable, "-P", "-m", "api.worker.watcher", *command],
+            stdin=subprocess.PIPE,  # its end tells the watcher that this process is gone
+            stdout=self._output,
+            stderr=subprocess.PIPE,
+            text=True,
+            errors="replace",
+            env=_environment(os.environ),
+            start_new_session=True,
+        )
+        self._reader = threading.Thread(target=self._read, args=(log,), name="log", daemon=True)
+        self._reader.start()
+
+    def wait(self, seconds: float) -> int | None:
+        """Wait for the end, so long at most, and return the status; 128 and the signal if one ended it.
+
+        None if it is still running.
+        """
+        try:
+            status = self._watcher.wait(seconds)
+        except subprocess.TimeoutExpired:
+            return None
+        self._reader.join(_END_SECONDS)
+        return status if status >= 0 else 128 - status
+
+    def output(self) -> str:
+        """Return what it has said on standard output."""
+        self._output.seek(0)
+        return self._output.read()
+
+    def end(self) -> None:
+        """Kill it and all its descendants; none is left when this returns."""
+        assert self._watcher.stdin is not None
+        self._watcher.stdin.close()
+        self._watcher.wait()
+
+    def __exit__(self, *_: object) -> None:
+        self.end()
+        self._reader.join(_END_SECONDS)
+        self._output.close()
+
+    def _read(self, log: Path) -> None:
+        assert self._watcher.stderr is not None
+        with self._watcher.stderr as said, log.open("a", encoding="utf-8") as file:
+            for line in said:
+                self._take(line, file)
+
+    def _take(self, line: str, log: TextIO) -> None:
+        try:
+            self.progress = ProgressLine.model_validate_json(line)
+        except ValidationError:
+            self.last_words = line.strip() or self.last_words
+            log.write(line)
+        else:
+            log.write(f"{self.progress.fraction:4.0%}  {self.progress.message}\n")
+        log.flush()
+
+
+def _environment(environment: Mapping[str, str]) -> dict[str, str]:
+    # The launcher finds its helpers by PATH.
+    path = os.pathsep.join([str(Path(sys.executable).parent), environment.get("PATH", os.defpath)])
+    return {**environment, "PATH": path}

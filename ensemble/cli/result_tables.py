@@ -1,0 +1,108 @@
+"""Tables for people: boundaries, runs, and lists of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from rich.table import Column, Table
+
+from ensemble.search.boundary import Boundary, BoundaryPoint
+from ensemble.store.run_record import RunSummary
+
+_ABSENT = "–"
+
+
+def boundary_columns(points: Sequence[BoundaryPoint]) -> list[str]:
+    """Headings for `boundary_cells`."""
+    return [*points[0].parameters, "critical value", "bracket", "outcomes", "status", "certified by", "runs"]
+
+
+def boundary_cells(point: BoundaryPoint) -> list[str]:
+    """One point of a boundary as the cells of a row."""
+    return [
+        *(_number(value) for value in point.parameters.values()),
+        _number(point.critical_value),
+        bracket_text(point),
+        " | ".join(outcome or "?" for outcome in point.outcomes),
+        point.status,
+        _certifying_numerics(point),
+        str(len(point.runs)),
+    ]
+
+
+def bracket_text(point: BoundaryPoint) -> str:
+    """The two ends of a bracket, a question mark where one is unknown."""
+    return " – ".join("?" if end is None else f"{end:.6g}" for end in point.bracket)
+
+
+def _certifying_numerics(point: BoundaryPoint) -> str:
+    numerics = point.certified_by
+    return _ABSENT if numerics is None else f"{numerics.points} points, {numerics.tolerance:g}"
+
+
+def boundary_table(boundary: Boundary) -> Table:
+    """One boundary, a row for each of its points."""
+    table = Table(*boundary_columns(boundary.points), title=boundary.name)
+    for point in boundary.points:
+        table.add_row(*boundary_cells(point))
+    return table
+
+
+def run_table(document: Mapping[str, Any]) -> Table:
+    """One document, a row for each of its fields; those of nested ones have dotted names."""
+    table = Table(show_header=False)
+    for name, value in _leaves(document):
+        table.add_row(name, _number(value))
+    return table
+
+
+def runs_table(summaries: Sequence[RunSummary]) -> Table:
+    """Runs, one a row."""
+    table = Table(_whole("run"), "outcome", "flow", "rate", "hamaker")
+    for summary in summaries:
+        flow, adhesion = summary.scene.flow, summary.scene.adhesion
+        table.add_row(
+            summary.key,
+            summary.outcome,
+            _ABSENT if flow is None else flow.kind,
+            _ABSENT if flow is None else _number(flow.rate),
+            _ABSENT if adhesion is None else _number(adhesion.hamaker),
+        )
+    return table
+
+
+def boundaries_table(boundaries: Sequence[Boundary]) -> Table:
+    """Boundaries, one a row."""
+    table = Table(_whole("boundary"), "name", "points", "converged", "certified", "updated")
+    for boundary in boundaries:
+        converged = sum(point.status == "converged" for point in boundary.points)
+        table.add_row(
+            boundary.study_key,
+            boundary.name,
+            str(len(boundary.points)),
+            str(converged),
+            str(sum(point.certified for point in boundary.points)),
+            f"{boundary.updated:%Y-%m-%d %H:%M:%S}",
+        )
+    return table
+
+
+def _whole(heading: str) -> Column:
+    # A key is there to be copied: other columns give way first.
+    return Column(heading, no_wrap=True, overflow="ignore")
+
+
+def _leaves(document: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Any]]:
+    leaves = []
+    for name, value in document.items():
+        leaves += (
+            _leaves(value, f"{prefix}{name}.") if isinstance(value, Mapping) else [(f"{prefix}{name}", value)]
+        )
+    return leaves
+
+
+def _number(value: Any) -> str:
+    if value is None:
+        return _ABSENT
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,1 @@
+"""Studies and scenes as documents: models, presets, and changes by dotted path."""

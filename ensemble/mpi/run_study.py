@@ -1,0 +1,162 @@
+"""Traces a study, or runs a batch of scenes, on all ranks of a communicator, in groups."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeVar, cast
+
+from ensemble.mpi.dispatcher import Dispatcher, Standing, work
+from ensemble.mpi.groups import Groups
+from ensemble.mpi.usage import Cost, Usage
+from ensemble.mpi.world import abort_guard
+from ensemble.search.batch import Batch
+from ensemble.search.point_search import Trial
+from ensemble.search.study_planner import Coordinator
+from ensemble.search.task_queue import Agenda, Task
+
+if TYPE_CHECKING:
+    from mpi4py.MPI import Intracomm
+
+    from ensemble.config.study import Study
+    from ensemble.search.boundary import Boundary
+    from ensemble.store import Store
+    from solver.scene import Scene
+
+Result = TypeVar("Result")
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """Where a study stands."""
+
+    boundary: Boundary
+    standing: Standing[Trial]
+
+
+@dataclass(frozen=True)
+class Traced:
+    """A study's result, and what it cost."""
+
+    boundary: Boundary
+    cost: Cost
+
+
+def trace(
+    communicator: Intracomm,
+    study: Study,
+    store: Store,
+    on_change: Callable[[Snapshot], None],
+    ranks_per_run: int = 1,
+) -> Traced:
+    """Trace the boundary of a study, running what the store does not have.
+
+    Collective.
+
+    Parameters
+    ----------
+    communicator : Intracomm
+        Its MPI library must provide MPI_THREAD_MULTIPLE.  Any exception on any rank aborts it.
+    study : Study
+    store : Store
+        The same on every rank; rank 0 commits.
+    on_change : callable
+        Called on rank 0, in the coordinator's thread, whenever an answer or an assignment changed something.
+    ranks_per_run : int
+        How many ranks compute a run together.
+
+    Returns
+    -------
+    Traced
+        On every rank.
+    """
+
+    def begin() -> Coordinator:
+        return Coordinator(study, store.outcome, (summary.scene for summary in store.summaries()))
+
+    def publish(coordinator: Coordinator, standing: Standing[Trial]) -> None:
+        boundary = coordinator.boundary()
+        store.save_boundary(boundary)
+        on_change(Snapshot(boundary, standing))
+
+    boundary, cost = carry_out(communicator, ranks_per_run, store, begin, publish, Coordinator.boundary)
+    return Traced(boundary, cost)
+
+
+def run_batch(
+    communicator: Intracomm,
+    scenes: Iterable[Scene],
+    store: Store,
+    on_change: Callable[[Standing[Task]], None],
+    ranks_per_run: int = 1,
+) -> Cost:
+    """Run independent scenes, as far as the store does not have their runs.
+
+    Collective; parameters as for `trace`.  A run that fails numerically is made and kept like any other.
+
+    Returns
+    -------
+    Cost
+        On every rank.
+    """
+    _, cost = carry_out(
+        communicator,
+        ranks_per_run,
+        store,
+        begin=lambda: Batch(scenes, store.outcome),
+        publish=lambda batch, standing: on_change(standing),
+        conclude=lambda batch: None,
+    )
+    return cost
+
+
+SomeAgenda = TypeVar("SomeAgenda", bound=Agenda)
+
+
+def carry_out(
+    communicator: Intracomm,
+    ranks_per_run: int,
+    store: Store,
+    begin: Callable[[], SomeAgenda],
+    publish: Callable[[SomeAgenda, Standing], None],
+    conclude: Callable[[SomeAgenda], Result],
+) -> tuple[Result, Cost]:
+    """Make the runs of an agenda; every rank gets what rank 0 concludes from it, and what it cost.
+
+    Collective.
+
+    Parameters
+    ----------
+    communicator, ranks_per_run, store
+        As for `trace`.
+    begin : callable
+        Returns the agenda, on rank 0.
+    publish : callable
+        Called as ``on_change`` of `trace` is, with the agenda.
+    conclude : callable
+        Returns what is wanted of the agenda once it is done; it is pickled.
+    """
+    groups = Groups.of(communicator, ranks_per_run)
+    everyone, leaders = groups.everyone, groups.leaders
+
+    def coordinate(leaders: Intracomm) -> tuple[Result, Cost]:
+        with abort_guard(everyone):
+            usage = Usage(leaders.Get_size(), time.perf_counter)
+            agenda = begin()
+            dispatcher = Dispatcher(leaders, agenda, store, lambda standing: publish(agenda, standing), usage)
+            cost = dispatcher.run()
+            return conclude(agenda), cost
+
+    result: tuple[Result, Cost] | None = None
+    if leaders is not None and leaders.Get_rank() == 0:
+        with ThreadPoolExecutor(1, "coordinator") as beside:
+            coordination = beside.submit(coordinate, leaders)
+            work(groups, store)
+            result = coordination.result()
+    else:
+        work(groups, store)
+    result = everyone.bcast(result)
+    groups.free()
+    return cast(tuple[Result, Cost], result)

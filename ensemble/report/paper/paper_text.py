@@ -1,0 +1,144 @@
+"""The report for people: Markdown, and the HTML made from it."""
+
+from __future__ import annotations
+
+from html import escape
+from string import Template
+
+from markdown_it import MarkdownIt
+
+from ensemble.report.paper.comparison import PERCENT, Row, Value
+from ensemble.report.paper.paper_document import Figure, Paper, Part
+
+_ABSENT = "–"
+_KEY_DIGITS = 8  # of a run's key, in tables; enough to find it
+
+_SOURCE = (
+    "B. Quaife, S. Veerapaneni and Y.-N. Young, *Hydrodynamics and rheology of a vesicle doublet "
+    "suspension*, Phys. Rev. Fluids (2019)"
+)
+
+_PAGE = Template("""<!doctype html>
+<html lang="en">
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>$title</title>
+<style>
+body { font: 16px/1.5 Georgia, serif; max-width: 58rem; margin: 2rem auto; padding: 0 1rem; color: #222; }
+h1, h2 { font-weight: normal; line-height: 1.2; }
+h2 { margin-top: 3rem; border-top: 1px solid #ccc; padding-top: 1rem; }
+img { display: block; max-width: 100%; margin: 1.5rem auto 0.3rem; }
+table { border-collapse: collapse; font: 13px/1.35 system-ui, sans-serif; display: block; overflow-x: auto; }
+th, td { padding: 0.25rem 0.6rem; text-align: left; border-bottom: 1px solid #e4e4e4; vertical-align: top; }
+td { font-variant-numeric: tabular-nums; }
+code { font-size: 0.85em; background: #f4f4f4; overflow-wrap: anywhere; }
+details { font-size: 0.9em; margin: 0.5rem 0 1.5rem; }
+em { color: #444; }
+</style>
+$body
+</html>
+""")
+
+
+def paper_text(paper: Paper, suffix: str = ".png") -> str:
+    """Return the report as Markdown, with the figures of this kind."""
+    rows = [row for part in paper.parts for row in part.rows]
+    judged = [row for row in rows if row.agrees is not None]
+    kept = sum(bool(row.agrees) for row in judged)
+    sections = [
+        "# The paper, recomputed",
+        f"{_SOURCE}: its figures and tables, computed again, with the published values beside the computed "
+        "ones.  *Deviation* is that of the computed from the published value; between brackets it is the "
+        "distance, 0 where they overlap.",
+        f"{'Quick (thinned) report.  ' if paper.quick else ''}{kept} of the {len(judged)} values for which a "
+        f"deviation is allowed keep it.  {paper.runs} runs made for it now, in {paper.wall_seconds:.0f} s "
+        f"on {paper.ranks} ranks; the others were in the store.",
+        f"Made on: {paper.machine.sentence()}.",
+        "\n".join(f"- [{part.title}](#{_anchor(part)})" for part in paper.parts),
+        *(text for part in paper.parts for text in _part_text(part, suffix)),
+    ]
+    return "\n\n".join(sections) + "\n"
+
+
+def paper_page(paper: Paper) -> str:
+    """Return the report as an HTML page."""
+    markdown = MarkdownIt("commonmark").enable("table")
+    return _PAGE.substitute(title="The paper, recomputed", body=markdown.render(paper_text(paper, ".svg")))
+
+
+def _anchor(part: Part) -> str:
+    return f"section-{part.name}"
+
+
+def _part_text(part: Part, suffix: str) -> list[str]:
+    texts = [f'<a id="{_anchor(part)}"></a>', f"## {part.title}"]
+    for element in part.content:
+        match element:
+            case str():
+                texts.append(element)
+            case Figure():
+                texts += [
+                    f"![{element.name}]({element.name}{suffix})",
+                    f"*{element.caption}*",
+                    f"`{element.command}`",
+                ]
+            case list():
+                texts += [_table(element), _sources(element)]
+    return texts
+
+
+def _table(rows: list[Row]) -> str:
+    noted = any(row.note for row in rows)
+    heading = ["", "published", "computed", "deviation", "allowed", *(["note"] if noted else [])]
+    lines = [heading, ["---"] * len(heading)]
+    for row in rows:
+        allowed = _ABSENT if row.allowed is None else f"± {row.allowed:g}{_unit(row)}"
+        judged = "" if row.agrees is None else " ✓" if row.agrees else " ✗"
+        lines.append(
+            [
+                row.quantity,
+                _value(row.published),
+                _value(row.computed),
+                _deviation(row) + judged,
+                allowed,
+                *([row.note] if noted else []),
+            ]
+        )
+    return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)
+
+
+def _sources(rows: list[Row]) -> str:
+    """Runs and commands behind a table, folded away."""
+    items = []
+    for row in rows:
+        if row.command or row.runs:
+            keys = " ".join(key[:_KEY_DIGITS] for key in row.runs)
+            command = f"<code>{escape(row.command)}</code>" if row.command else ""
+            items.append(f"<li>{escape(row.quantity)}: {command} {f'(runs {keys})' if keys else ''}</li>")
+    if not items:
+        return ""
+    # One block without empty lines, or Markdown would end the HTML there.
+    return "\n".join(["<details><summary>Runs and commands</summary><ul>", *items, "</ul></details>"])
+
+
+def _value(value: Value) -> str:
+    match value:
+        case None:
+            return _ABSENT
+        case str():
+            return value
+        case (low, high):
+            return f"{low:.4g} to {high:.4g}"
+        case _:
+            return f"{value:.4g}"
+
+
+def _deviation(row: Row) -> str:
+    if row.deviation is None:
+        return ""
+    digits = 2 if row.unit == PERCENT else 3
+    return f"{row.deviation:+.{digits}f}{_unit(row)}"
+
+
+def _unit(row: Row) -> str:
+    return f" {row.unit}" if row.unit == PERCENT or row.unit[:1].isalpha() else row.unit

@@ -1,0 +1,42 @@
+"""What the scaling report measures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from solver.scene import Adhesion, Numerics, Scene, Shear, Vesicle
+from solver.scene.arrangement import Random
+
+POINTS = 64  # on each vesicle
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Numbers of vesicles, and how often each evaluation is repeated.
+
+    shared : by all numbers of ranks.
+    alone : by one rank, for cost and memory, ascending.
+    weak : by one rank, and by G ranks times √G, so that each has the same pairs.
+    """
+
+    shared: tuple[int, ...]
+    alone: tuple[int, ...]
+    weak: int
+    repeats: int
+
+
+QUICK = Plan(shared=(2, 16, 64), alone=(2, 8, 16, 32, 64, 128), weak=32, repeats=6)
+FULL = Plan(shared=(2, 16, 64, 256), alone=(2, 8, 16, 32, 64, 128, 256, 512, 1024), weak=64, repeats=12)
+
+
+def suspension(vesicles: int) -> Scene:
+    """Adhering vesicles in shear: the published pair, or as many at random, filling a fifth of a square."""
+    pair = (Vesicle(center=(-1.5, 0.0)), Vesicle(center=(1.5, 0.0)))
+    placed = pair if vesicles == 2 else Random(count=vesicles, area_fraction=0.2, seed=1).vesicles()
+    return Scene(
+        horizon=20.0,
+        vesicles=placed,
+        adhesion=Adhesion(hamaker=1.5, distance=0.4),
+        flow=Shear(rate=0.5),
+        numerics=Numerics(points=POINTS),
+    )

@@ -1,0 +1,82 @@
+"""The scaling report as Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ensemble.mpi.scaling_model import LEAST_EFFICIENCY, ScalingModel
+from ensemble.report.markdown import table
+from ensemble.report.scaling.scaling_document import Scaling
+
+_EVALUATION = {
+    "vesicles": "vesicles",
+    "ranks": "ranks",
+    "seconds": "seconds",
+    "efficiency": "efficiency",
+    "seconds by the model": "predicted",
+    "kernels": "kernels",
+    "collectives": "collectives",
+    "solves": "solves",
+    "other": "other",
+    "gathers": "gathers",
+    "bytes gathered": "gathered_bytes",
+    "difference from one rank": "difference",
+}
+_WEAK = {"vesicles": "vesicles", "ranks": "ranks", "seconds": "seconds", "efficiency": "efficiency"}
+_COLLECTIVE = {"ranks": "ranks", "bytes": "gathered_bytes", "seconds": "seconds"}
+_COST = {
+    "vesicles": "vesicles",
+    "seconds": "seconds",
+    "sums over all points": "sums",
+    "peak memory (bytes)": "peak_memory_bytes",
+    "seconds with fast summation (model)": "with_fast_summation",
+}
+_PREDICTION = {"vesicles": "vesicles", "ranks": "ranks", "efficiency": "efficiency"}
+
+
+def scaling_text(report: Scaling, figures: Sequence[str]) -> str:
+    """Return the report, with figures in these files."""
+    model, crossover = report.model, report.crossover
+    pays = f"beyond {crossover.vesicles} vesicles" if crossover.vesicles else "for no number measured"
+    crowded = "  There are more ranks than cores: times say nothing, only results do." * report.oversubscribed
+    sections = [
+        "# Scaling",
+        f"Made on: {report.machine.sentence()}; {report.ranks} ranks, one thread each.{crowded}  "
+        f"Evaluations of the right-hand side, {report.points} points on each vesicle: adhering "
+        "vesicles in shear, at random places in a square of which they fill a fifth (2: the published pair, "
+        "of which one is computed).  "
+        "The least of several times each; compiling is not timed.",
+        *(f"![{name}]({name})" for name in figures),
+        "## Strong scaling",
+        "Shares of the time are those of the first rank, profiled; waiting for others is in the collectives.",
+        table(_EVALUATION, report.evaluations),
+        "## Weak scaling",
+        "As many pairs of points on each rank: vesicles grow like the root of the ranks.",
+        table(_WEAK, report.weak),
+        "## Collectives",
+        f"Allgatherv; latency {model.latency:.2g} s, bandwidth {model.bandwidth:.2g} bytes/s.",
+        table(_COLLECTIVE, report.collectives),
+        "## Model",
+        "t(G) = (pair·P² + point·P)/G + repeated·P + fixed + gathers·(latency·⌈log₂ G⌉ + bytes·P·(G − 1)/"
+        f"(G·bandwidth)) for P points on G ranks, with {_constants(model)}.  Its "
+        f"largest deviation from a measured time is {report.largest_misprediction:.0%}.  Latency and "
+        "bandwidth are those of this machine; a network's are others.",
+        table(_PREDICTION, report.predictions),
+        "## Ranks for a run",
+        f"The most ranks, up to 10,000, on which the model is {LEAST_EFFICIENCY:.0%} efficient.",
+        table({"vesicles": "vesicles", "ranks": "ranks"}, report.recommendations),
+        "## Cost against the number of vesicles, and fast summation",
+        f"{crossover.assumption}  Then a point costs as much as {crossover.pairs_a_point:.0f} pairs of the "
+        f"direct sum, of {crossover.pair_seconds:.2g} s each here, and {crossover.point_seconds:.2g} s in an "
+        f"evaluation.  Against that, series of whole vesicles make the time above grow by {model.pair:.2g} s "
+        f"for each pair: fast summation pays {pays}.",
+        table(_COST, report.costs),
+    ]
+    return "\n\n".join(sections) + "\n"
+
+
+def _constants(model: ScalingModel) -> str:
+    """The constants of the time that is computed, and how often and how much is exchanged."""
+    seconds = {name: getattr(model, name) for name in ("pair", "point", "repeated", "fixed")}
+    each = [f"{name} = {value:.3g} s" for name, value in seconds.items()]
+    return ", ".join([*each, f"gathers = {model.gathers:.3g}", f"bytes = {model.bytes_a_point:.3g}"])

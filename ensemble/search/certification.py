@@ -1,0 +1,171 @@
+"""Certification of a converged search: both ends of its bracket are run again at finer numerics.
+
+Finer means, here and nowhere else, `POINTS_FACTOR` times as many points on a vesicle and a tolerance in time
+`TOLERANCE_FACTOR` times smaller.  Where the tolerance chooses the points, the smaller one does: the numerics
+must follow from the scene alone, and not from how many points a run has ended with.
+
+An end that does not come out on its side again is moved outward, one value of the grid at a time and at the
+finer numerics, until one does: the bracket only ever widens, so it holds the critical value at both numerics.
+Each end depends on nothing but the outcomes along its own way, hence the certified bracket, like that of the
+search, on the physics alone.
+
+Pure: no MPI, no files, no clock.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from enum import StrEnum
+from itertools import takewhile
+
+from pydantic import ValidationError
+
+from ensemble.config.overrides import explain
+from ensemble.search.critical_value import Side, Status
+from ensemble.search.grid import GeometricGrid
+from solver.scene import Numerics, Scene
+
+POINTS_FACTOR = 2
+TOLERANCE_FACTOR = 10
+
+
+def finer(scene: Scene) -> Scene:
+    """Return the scene at the numerics that certify it.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Returns
+    -------
+    Scene
+        With `POINTS_FACTOR` times the points, unless the tolerance chooses them, and 1/`TOLERANCE_FACTOR` of
+        the tolerance; else the same.
+
+    Raises
+    ------
+    ValueError
+        If that is finer than numerics can be; names the field and what it allows.
+    """
+    numerics = scene.numerics
+    points = numerics.points
+    document = numerics.model_dump() | {
+        "points": points if points == "auto" else points * POINTS_FACTOR,
+        "tolerance": numerics.tolerance / TOLERANCE_FACTOR,
+    }
+    try:
+        return scene.model_copy(update={"numerics": Numerics.model_validate(document)})
+    except ValidationError as error:
+        raise ValueError(f"to certify, numerics.{explain(error, document)}") from error
+
+
+class Verdict(StrEnum):
+    """What a certification has come to; it is the status of its point.
+
+    CERTIFYING : an end has not been found again yet.
+    CONVERGED : both ends have been found again, where they were or farther out.
+    NON_MONOTONE : they have, but between them the finer numerics say high below low.
+    UNCERTIFIED : up to the limits there is no value at which one of the ends could be found again.
+    """
+
+    CERTIFYING = "certifying"
+    CONVERGED = Status.CONVERGED
+    NON_MONOTONE = Status.NON_MONOTONE
+    UNCERTIFIED = "uncertified"
+
+
+class Certification:
+    """The bracket of a converged search, tried at finer numerics.
+
+    Parameters
+    ----------
+    grid : GeometricGrid
+    limits : (float, float)
+        Of the search.
+    bracket : (float, float)
+        Two values on the grid, within the limits.
+    """
+
+    def __init__(
+        self, grid: GeometricGrid, limits: tuple[float, float], bracket: tuple[float, float]
+    ) -> None:
+        indices = grid.within(*limits)
+        low, high = map(grid.index, bracket)
+        self._grid = grid
+        self._ways = {
+            Side.LOW: range(low, indices[0] - 1, -1),
+            Side.HIGH: range(high, indices[-1] + 1),
+        }
+        self._sides: dict[int, Side] = {}
+        self._pending: set[int] = set()
+
+    def ask(self) -> float | None:
+        """Return a value to try now and mark it as pending; None if there is none."""
+        for index in self._wanted():
+            if index not in self._pending:
+                self._pending.add(index)
+                return self._grid.value(index)
+        return None
+
+    def tell(self, value: float, side: Side) -> None:
+        """Take the answer at the finer numerics for a value, asked for or not.
+
+        Raises
+        ------
+        ValueError
+            If the value is not on the grid.
+        """
+        index = self._grid.index(value)
+        self._pending.discard(index)
+        self._sides[index] = side
+
+    def withdraw(self, value: float) -> None:
+        """Give back a pending value whose run was cancelled or lost; it may be asked again."""
+        self._pending.remove(self._grid.index(value))
+
+    def pointless(self) -> frozenset[float]:
+        """Return the pending values whose answers no longer matter."""
+        return frozenset(map(self._grid.value, self._pending.difference(self._wanted())))
+
+    @property
+    def ends_left(self) -> int:
+        """How many ends have to be found again yet."""
+        return len(list(self._wanted()))
+
+    @property
+    def bracket(self) -> tuple[float, float] | None:
+        """The two values at which the ends have been found again; None until both have."""
+        low, high = self._reached(Side.LOW), self._reached(Side.HIGH)
+        if low is None or high is None or self.ends_left:
+            return None
+        return self._grid.value(low), self._grid.value(high)
+
+    @property
+    def verdict(self) -> Verdict:
+        """What the certification has come to."""
+        if self.ends_left:
+            return Verdict.CERTIFYING
+        if self.bracket is None:
+            return Verdict.UNCERTIFIED
+        contradictory = Side.HIGH in self._met(Side.LOW) and Side.LOW in self._met(Side.HIGH)
+        return Verdict.NON_MONOTONE if contradictory else Verdict.CONVERGED
+
+    @property
+    def done(self) -> bool:
+        """Whether no further answer is needed."""
+        return self.verdict is not Verdict.CERTIFYING
+
+    def _reached(self, side: Side) -> int | None:
+        """How far out an end has come: the first index that was not told to be on another side."""
+        return next((index for index in self._ways[side] if self._sides.get(index, side) is side), None)
+
+    def _wanted(self) -> Iterator[int]:
+        """Where the ends have come, as far as not told; nothing once one of them has left the limits."""
+        reached = [self._reached(side) for side in self._ways]
+        if None not in reached:
+            yield from (index for index in reached if index is not None and index not in self._sides)
+
+    def _met(self, side: Side) -> set[Side]:
+        """On which sides the finer numerics put the values that an end has left behind."""
+        told = (self._sides.get(index, side) for index in self._ways[side])
+        return set(takewhile(lambda met: met is not side, told))

@@ -1,0 +1,286 @@
+"""Search for a critical value: where the outcome of runs changes side.  Pure: no MPI, no files, no clock.
+
+The search hands out values to try (`CriticalValue.ask`) and takes answers in any order
+(`CriticalValue.tell`).  Its final bracket depends only on the side of every value, not on how, by how many
+workers or in which order the answers were found:
+
+- Values lie on a grid, and where all runs are decided the bracket ends as two neighbors on it.
+- Runs without an answer (undecided, failed) are worked around.  Their zone is closed in from both sides
+  until `ZONE_EDGE` values in a row next to the largest low and next to the smallest high are known to
+  give no answer, or all between the two are.  This assumes at most one row of such a length or longer;
+  shorter ones may lie anywhere.
+- A low above a high contradicts a single critical value.  The search stops, and the bracket spans the
+  contradiction: from the largest low with no high at or below it to the smallest high with no low above.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+from itertools import pairwise
+from typing import Protocol
+
+from ensemble.search.grid import GeometricGrid
+
+# Numerical failures may be isolated, so one of them is not yet the edge of a zone that has no answers.
+ZONE_EDGE = 3
+
+
+class Side(StrEnum):
+    """On which side of the critical value an outcome lies; the last two are no answer to that."""
+
+    LOW = "low"
+    HIGH = "high"
+    UNDECIDED = "undecided"
+    FAILED = "failed"
+
+
+class Status(StrEnum):
+    """What a search has come to.
+
+    SEARCHING : there are values left whose answers matter.
+    CONVERGED : the bracket is two neighbors on the grid.
+    UNDECIDED, FAILED : it cannot be, as runs between its ends are undecided or (next to an end) failed.
+    NON_MONOTONE : a low was found above a high.
+    UNBRACKETED : all values within the limits lie on one side.
+    """
+
+    SEARCHING = "searching"
+    CONVERGED = "converged"
+    UNDECIDED = "undecided"
+    FAILED = "failed"
+    NON_MONOTONE = "non-monotone"
+    UNBRACKETED = "unbracketed"
+
+
+class _Belief(Protocol):
+    """Where the critical value is thought to lie, as a distribution over grid indices."""
+
+    def weight(self, low: int, high: int) -> float:
+        """Return the probability, up to a factor, of the interval between two indices."""
+
+    def middle(self, low: int, high: int) -> float:
+        """Return the point that halves this probability."""
+
+
+class _Anywhere:
+    """All indices alike; halving it is bisection."""
+
+    def weight(self, low: int, high: int) -> float:
+        return high - low
+
+    def middle(self, low: int, high: int) -> float:
+        return (low + high) / 2
+
+
+@dataclass(frozen=True)
+class _Near:
+    """A Cauchy distribution with its quartiles at the ends of a guess.
+
+    Halving it tries the middle of the guess, then the end on the side of the answer, then bisects within
+    the guess, or, when the guess was wrong, doubles the distance from it.  With offsets d from the center,
+    the distribution function is the angle of the vector (half_width, d); sums of unit vectors keep their
+    accuracy where differences of arctangents lose it.
+    """
+
+    center: float
+    half_width: float
+
+    def weight(self, low: int, high: int) -> float:
+        below, above = low - self.center, high - self.center
+        return math.atan2(self.half_width * (above - below), self.half_width**2 + below * above)
+
+    def middle(self, low: int, high: int) -> float:
+        below, above = low - self.center, high - self.center
+        norm_below, norm_above = math.hypot(self.half_width, below), math.hypot(self.half_width, above)
+        tangent = (below / norm_below + above / norm_above) / (1 / norm_below + 1 / norm_above)
+        return self.center + tangent
+
+
+class CriticalValue:
+    """The critical value on a grid, within limits.
+
+    Parameters
+    ----------
+    grid : GeometricGrid
+    limits : (float, float)
+        Values are tried from the first to the second, 0 < low < high.
+    guess : (float, float), optional
+        Where the critical value is expected.  It decides only what is tried first; it may be wrong.
+
+    Raises
+    ------
+    ValueError
+        If fewer than two grid values lie within the limits, or the guess is not 0 < low <= high.
+    """
+
+    def __init__(
+        self, grid: GeometricGrid, limits: tuple[float, float], guess: tuple[float, float] | None = None
+    ) -> None:
+        low, high = limits
+        if not 0 < low < high < math.inf:
+            raise ValueError(f"limits: [{low}, {high}] — must be 0 < low < high")
+        self._grid = grid
+        self._indices = grid.within(low, high)
+        if len(self._indices) < 2:
+            raise ValueError(f"limits: [{low}, {high}] — hold no two values {grid.tolerance} apart")
+        self._sides: dict[int, Side] = {}
+        self._pending: set[int] = set()
+        self._belief = self._believe(guess)
+
+    def ask(self) -> float | None:
+        """Return the most useful value to try now and mark it as pending; None if there is none.
+
+        Of all values that may narrow the bracket it is the one that halves the likeliest interval left
+        by the values told and pending.  That is bisection for a single worker, and for several it keeps
+        the expected remainder after all pending answers smallest.
+        """
+        gaps = [gap for region in self._regions() for gap in self._between_pending(*region)]
+        if not gaps:
+            return None
+        low, high = max(gaps, key=lambda gap: self._belief.weight(*gap))
+        index = min(max(round(self._belief.middle(low, high)), low + 1), high - 1)
+        self._pending.add(index)
+        return self._grid.value(index)
+
+    def tell(self, value: float, side: Side) -> None:
+        """Take the answer for a value, asked for or not.
+
+        Raises
+        ------
+        ValueError
+            If the value is not on the grid or outside the limits, or was told to lie on another side.
+        """
+        index = self._index(value)
+        known = self._sides.setdefault(index, side)
+        if known is not side:
+            raise ValueError(f"{value!r} cannot be {side}: it was told to be {known}")
+        self._pending.discard(index)
+
+    def withdraw(self, value: float) -> None:
+        """Give back a pending value whose run was cancelled or lost; it may be asked again.
+
+        Raises
+        ------
+        ValueError
+            If the value is not pending.
+        """
+        index = self._index(value)
+        if index not in self._pending:
+            raise ValueError(f"{value!r} is not pending")
+        self._pending.remove(index)
+
+    def reseed(self, guess: tuple[float, float]) -> None:
+        """Replace the guess, as long as nothing has been told.
+
+        Raises
+        ------
+        ValueError
+            If an answer has been told, or the guess is not 0 < low <= high.
+        """
+        if self._sides:
+            raise ValueError("a search that has answers takes no other guess")
+        self._belief = self._believe(guess)
+
+    def pointless(self) -> frozenset[float]:
+        """Return the pending values whose answers can no longer narrow the bracket."""
+        low, high = self._ends()
+        done = self.done
+        return frozenset(self._grid.value(index) for index in self._pending if done or not low < index < high)
+
+    @property
+    def bracket(self) -> tuple[float | None, float | None]:
+        """The largest value known to be low and the smallest known to be high; None where unknown."""
+        low, high = self._ends()
+        return (
+            self._grid.value(low) if low in self._indices else None,
+            self._grid.value(high) if high in self._indices else None,
+        )
+
+    @property
+    def offending(self) -> tuple[float, ...]:
+        """The lows above a high and the highs below a low, ascending; empty unless non-monotone."""
+        low, high = self._ends()
+        return tuple(
+            self._grid.value(index)
+            for index in self._told_between(low, high)
+            if self._sides[index] in (Side.LOW, Side.HIGH)
+        )
+
+    @property
+    def status(self) -> Status:
+        """What the search has come to."""
+        if self.offending:
+            return Status.NON_MONOTONE
+        if self._regions():
+            return Status.SEARCHING
+        low, high = self._ends()
+        if high - low > 1:
+            failed = Side.FAILED in (self._sides[low + 1], self._sides[high - 1])
+            return Status.FAILED if failed else Status.UNDECIDED
+        return Status.CONVERGED if low in self._indices and high in self._indices else Status.UNBRACKETED
+
+    @property
+    def done(self) -> bool:
+        """Whether no further answer is needed."""
+        return self.status is not Status.SEARCHING
+
+    def _believe(self, guess: tuple[float, float] | None) -> _Belief:
+        if guess is None:
+            return _Anywhere()
+        low, high = guess
+        if not 0 < low <= high < math.inf:
+            raise ValueError(f"guess: [{low}, {high}] — must be 0 < low <= high")
+        first, last = self._grid.nearest(low), self._grid.nearest(high)
+        return _Near(center=(first + last) / 2, half_width=max((last - first) / 2, 1))
+
+    def _index(self, value: float) -> int:
+        index = self._grid.index(value)
+        if index not in self._indices:
+            first, last = self._grid.value(self._indices[0]), self._grid.value(self._indices[-1])
+            raise ValueError(f"{value!r} is outside the limits [{first}, {last}]")
+        return index
+
+    def _ends(self) -> tuple[int, int]:
+        """Return the indices of the bracket's ends, one beyond the limits where an end is unknown."""
+        lows = [index for index, side in self._sides.items() if side is Side.LOW]
+        highs = [index for index, side in self._sides.items() if side is Side.HIGH]
+        below, above = self._indices[0] - 1, self._indices[-1] + 1
+        smallest_high, largest_low = min(highs, default=above), max(lows, default=below)
+        return (
+            max((index for index in lows if index < smallest_high), default=below),
+            min((index for index in highs if index > largest_low), default=above),
+        )
+
+    def _told_between(self, low: int, high: int) -> list[int]:
+        return sorted(index for index in self._sides if low < index < high)
+
+    def _regions(self) -> list[tuple[int, int]]:
+        """Return the open intervals of values that matter: not told, and no longer implied by those told.
+
+        At most two, one at each end of the bracket; the same one twice if there is nothing between.
+        """
+        if self.offending:
+            return []
+        low, high = self._ends()
+        silent = self._told_between(low, high)
+        gaps = [gap for gap in pairwise([low, *silent, high]) if gap[1] - gap[0] > 1]
+        if not gaps:
+            return []
+        regions = []
+        first, next_silent = gaps[0]
+        if first == low:
+            regions.append((low, next_silent))
+        elif first - low < ZONE_EDGE:
+            regions.append((first, min(next_silent, low + ZONE_EDGE + 1)))
+        previous_silent, last = gaps[-1]
+        if last == high:
+            regions.append((previous_silent, high))
+        elif high - last < ZONE_EDGE:
+            regions.append((max(previous_silent, high - ZONE_EDGE - 1), last))
+        return regions
+
+    def _between_pending(self, low: int, high: int) -> list[tuple[int, int]]:
+        cuts = sorted(index for index in self._pending if low < index < high)
+        return [gap for gap in pairwise([low, *cuts, high]) if gap[1] - gap[0] > 1]

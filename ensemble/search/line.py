@@ -1,0 +1,34 @@
+"""The straight line through the points of a boundary."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.polynomial import Polynomial
+from pydantic import BaseModel
+
+from ensemble.search.boundary import Boundary
+from ensemble.search.critical_value import Status
+
+FEWEST_POINTS = 3  # two points lie on a line whatever the physics
+
+
+class Line(BaseModel):
+    """The straight line through the converged points: critical value = intercept + slope × parameter."""
+
+    intercept: float
+    slope: float
+
+
+def line_through(boundary: Boundary) -> Line | None:
+    """Fit a line to the converged points by least squares; None if there are fewer than three."""
+    swept = boundary.study["sweep"]["parameter"]
+    points = [
+        (point.parameters[swept], point.critical_value)
+        for point in boundary.points
+        if point.status == Status.CONVERGED and point.critical_value is not None
+    ]
+    if len(points) < FEWEST_POINTS:
+        return None
+    parameters, critical = np.array(points).T
+    intercept, slope = Polynomial.fit(parameters, critical, deg=1).convert().coef
+    return Line(intercept=float(intercept), slope=float(slope))

@@ -1,0 +1,198 @@
+"""Decides which run of a study is the most useful one to make next.  Pure: no MPI, no files, no clock."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
+
+from ensemble.config.parameters import parameter_value
+from ensemble.config.study import Study
+from ensemble.search.boundary import Boundary, BoundaryPoint
+from ensemble.search.certification import Certification, Verdict, finer
+from ensemble.search.critical_value import CriticalValue, Status
+from ensemble.search.grid import GeometricGrid
+from ensemble.search.point_search import Inquiry, Trial
+from ensemble.timestamp import now
+from solver.analysis.run import Outcome
+from solver.scene import Scene
+
+_AnyInquiry = Inquiry[CriticalValue] | Inquiry[Certification]
+
+ENDS = 2  # of a bracket, hence runs of a certification that finds both where they were
+
+
+class Coordinator:
+    """All searches of a study, the certifications of their brackets, and the tasks that are out.
+
+    Searches are worked on in the order of the sweep, one task each before any gets a second one: two workers
+    get further on two searches than on one, and finished searches tell the later ones where to begin.
+    When there are more workers than searches left, the searches are cut into more than two parts at once.
+    Certifications come before that, as their runs are needed whatever the others say.
+
+    Parameters
+    ----------
+    study : Study
+    known : callable
+        Outcome of the run with this key if it has been made before, else None.  Such a run is never a task.
+    made : iterable of Scene
+        Scenes of runs made before.  Those of this study that are known are answers from the start.
+    """
+
+    def __init__(
+        self, study: Study, known: Callable[[str], Outcome | None], made: Iterable[Scene] = ()
+    ) -> None:
+        self._study = study
+        self._known = known
+        grid = GeometricGrid(study.search.tolerance)
+        self._values = {grid.value(index) for index in grid.within(*study.search.limits)}
+        self._searches = {
+            at: Inquiry(study.critical_value(), at, partial(study.scene_at, at), study.side, known)
+            for at in study.sweep.values
+        }
+        self._certifications: dict[float, Inquiry[Certification]] = {}
+        for at, value in set(filter(None, map(self._place, made))):
+            self._searches[at].take_known(value)
+
+    def next_task(self) -> Trial | None:
+        """Return the most useful task for an idle worker; None if every useful run is out already."""
+        return next((task for task in map(self._next_of, self._by_use()) if task is not None), None)
+
+    def answer(self, task: Trial, outcome: Outcome) -> None:
+        """Take the outcome of a task's run."""
+        self._inquiry_of(task).answer(task, outcome)
+
+    def cancelled(self, task: Trial) -> None:
+        """Take back a task whose run was given up."""
+        self._inquiry_of(task).cancelled(task)
+
+    def pointless_tasks(self) -> tuple[Trial, ...]:
+        """Return the tasks that are out and whose outcome no longer matters."""
+        needed = list(self._inquiries())
+        # A late answer may have shown that there is no single critical value, hence nothing to certify.
+        overtaken = [inquiry for inquiry in self._certifications.values() if inquiry not in needed]
+        return (
+            *(task for inquiry in needed for task in inquiry.pointless_tasks()),
+            *(task for inquiry in overtaken for task in inquiry.pending.values()),
+        )
+
+    @property
+    def done(self) -> bool:
+        """Whether no search and no certification needs any further answer."""
+        return all(inquiry.asking.done for inquiry in self._inquiries())
+
+    @property
+    def known_answers(self) -> int:
+        """How many answers are from runs made before."""
+        return sum(inquiry.known_answers for inquiry in self._inquiries())
+
+    @property
+    def runs_left(self) -> float:
+        """How many more answers are needed if each halves a bracket or certifies an end of one."""
+        searching = [at for at, search in self._searches.items() if not search.asking.done]
+        ends = sum(certification.asking.ends_left for certification in self._certifying())
+        if self._study.search.certify:
+            ends += ENDS * len(searching)
+        return sum(map(self._halvings, searching)) + ends
+
+    def boundary(self) -> Boundary:
+        """Return the boundary as far as it is known."""
+        return Boundary(
+            study_key=self._study.key,
+            study=self._study.model_dump(mode="json"),
+            name=self._study.name,
+            points=[self._point(at) for at in self._study.sweep.values],
+            updated=now(),
+        )
+
+    def _place(self, scene: Scene) -> tuple[float, float] | None:
+        """Where in the study a run of this scene would be, if everything else in it is the study's."""
+        try:
+            at = parameter_value(scene, self._study.sweep.parameter)
+            value = parameter_value(scene, self._study.search.parameter)
+        except ValueError:  # a scene of another kind
+            return None
+        return (at, value) if at in self._searches and value in self._values else None
+
+    def _by_use(self) -> Iterator[_AnyInquiry]:
+        """Give all inquiries, the one whose next task is the most useful first."""
+        # Sorting is stable: among equally busy searches the order of the sweep holds.
+        searches = sorted(self._searches.values(), key=lambda search: len(search.pending))
+        yield from (search for search in searches if not search.pending)
+        yield from self._certifying()
+        yield from (search for search in searches if search.pending)
+        # Known answers may have ended a search on the way here.
+        yield from self._certifying()
+
+    def _next_of(self, inquiry: _AnyInquiry) -> Trial | None:
+        if isinstance(inquiry.asking, CriticalValue) and inquiry.untouched:
+            guess = self._study.guess_at(inquiry.sweep_value, self._converged())
+            if guess is not None:
+                inquiry.asking.reseed(guess)
+        return inquiry.next_task()
+
+    def _inquiries(self) -> Iterator[_AnyInquiry]:
+        yield from self._searches.values()
+        yield from self._certifying()
+
+    def _inquiry_of(self, task: Trial) -> _AnyInquiry:
+        certification = self._certifications.get(task.sweep_value)
+        if certification is not None and task in certification.pending.values():
+            return certification
+        return self._searches[task.sweep_value]
+
+    def _certifying(self) -> list[Inquiry[Certification]]:
+        every = map(self._certification, self._searches)
+        return [certification for certification in every if certification is not None]
+
+    def _certification(self, at: float) -> Inquiry[Certification] | None:
+        """Return the certification of a search that has converged, beginning it if it is new."""
+        bracket = self._converged_bracket(at) if self._study.search.certify else None
+        if bracket is None:
+            return None
+        if at not in self._certifications:
+            self._certifications[at] = Inquiry(
+                self._study.certification(bracket),
+                at,
+                lambda value: finer(self._study.scene_at(at, value)),
+                self._study.side,
+                self._known,
+            )
+            self._certifications[at].take_all_known()
+        return self._certifications[at]
+
+    def _converged(self) -> dict[float, tuple[float, float]]:
+        brackets = {at: self._converged_bracket(at) for at in self._searches}
+        return {at: bracket for at, bracket in brackets.items() if bracket is not None}
+
+    def _converged_bracket(self, at: float) -> tuple[float, float] | None:
+        search = self._searches[at].asking
+        low, high = search.bracket if search.status is Status.CONVERGED else (None, None)
+        return None if low is None or high is None else (low, high)
+
+    def _halvings(self, at: float) -> float:
+        limits = self._study.search.limits
+        bracket = self._searches[at].asking.bracket
+        low, high = (end or limit for end, limit in zip(bracket, limits, strict=True))
+        return max(1.0, math.log2(math.log(high / low) / math.log1p(self._study.search.tolerance)))
+
+    def _point(self, at: float) -> BoundaryPoint:
+        search, certification = self._searches[at], self._certification(at)
+        bracket, status, runs = search.asking.bracket, str(search.asking.status), search.runs
+        outcomes, certified_by = search.outcomes(bracket), None
+        if certification is not None:
+            verdict, ends = certification.asking.verdict, certification.asking.bracket
+            status, runs = str(verdict), runs + certification.runs
+            if ends is not None:
+                bracket, outcomes = ends, certification.outcomes(ends)
+                if verdict is Verdict.CONVERGED:
+                    certified_by = finer(self._study.scene_at(at, ends[0])).numerics
+        return BoundaryPoint(
+            parameters={self._study.sweep.parameter: at},
+            bracket=bracket,
+            outcomes=outcomes,
+            status=status,
+            certified=certified_by is not None,
+            certified_by=certified_by,
+            runs=runs,
+        )

@@ -1,0 +1,126 @@
+"""A run as files hold it: a summary (everything that is not an array) and arrays with named dimensions."""
+
+from __future__ import annotations
+
+import json
+import platform
+from collections.abc import Callable, Mapping
+from importlib.metadata import version
+from typing import Any, NamedTuple, Self
+
+from pydantic import BaseModel, ConfigDict
+
+from ensemble.store.run_key import DISTRIBUTION, run_key
+from ensemble.timestamp import Timestamp, now
+from solver.analysis.run import Array, Energy, Errors, Frames, Outcome, Run, Viscosity, Work
+from solver.scene import Scene
+
+RESULT_PACKAGES = (DISTRIBUTION, "numpy", "scipy", "numba")
+
+
+class RunSummary(BaseModel):
+    """Everything about a run except its arrays.  Its JSON is the attributes of the run's files.
+
+    Results have the names, units and None of `solver.analysis.run.Run`; `series` and `vesicle_series` name the
+    recorded diagnostics, `versions` the packages that the numbers depend on.
+    """
+
+    # Strings keep NaN and infinity, which a failed run may carry, inside the JSON standard.
+    model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="strings")
+
+    key: str
+    created: Timestamp
+    versions: dict[str, str]
+    scene: Scene
+    outcome: Outcome
+    failure: str | None
+    time: float
+    period: float | None
+    effective_aspect_ratio: float | None
+    inclination_angle: float | None
+    gap: float | None
+    viscosity: Viscosity | None
+    energy: Energy
+    error: Errors
+    work: Work
+    series: tuple[str, ...]
+    vesicle_series: tuple[str, ...] = ()
+
+    @property
+    def wall_seconds(self) -> float:
+        """Wall time that the simulation took."""
+        return self.work.wall_seconds
+
+    def document(self) -> dict[str, Any]:
+        """Return the summary as strictly valid JSON data; floats keep every bit."""
+        return dict(json.loads(self.model_dump_json()))
+
+    @classmethod
+    def of(cls, run: Run) -> Self:
+        """Summarize a run that this process has just finished."""
+        results = {name: getattr(run, name) for name in RESULTS}
+        versions = {package: version(package) for package in RESULT_PACKAGES}
+        return cls(
+            key=run_key(run.scene),
+            created=now(),
+            versions=versions | {"python": platform.python_version()},
+            series=tuple(sorted(run.series)),
+            vesicle_series=tuple(sorted(run.vesicle_series)),
+            **results,
+        )
+
+
+_OTHERS = ("key", "created", "versions", "series", "vesicle_series")
+# The fields of a run that its summary holds unchanged.
+RESULTS = tuple(name for name in RunSummary.model_fields if name not in _OTHERS)
+
+
+class NamedArray(NamedTuple):
+    """Values and the names of their dimensions."""
+
+    dimensions: tuple[str, ...]
+    values: Array
+
+
+# Dimension `frame_time` has a coordinate of its own name, as `time` has, so xarray indexes both.
+FRAME_DIMENSIONS: Mapping[str, tuple[str, ...]] = {
+    "frame_time": ("frame_time",),
+    "tangent_angle": ("frame_time", "vesicle", "point"),
+    "center": ("frame_time", "vesicle", "axis"),
+    "tension": ("frame_time", "vesicle", "point"),
+}
+
+
+def arrays(run: Run) -> dict[str, NamedArray]:
+    """Arrays of a run by name: diagnostics over `time`, then the frames over `frame_time`."""
+    frames = {
+        "frame_time": run.frames.time,
+        "tangent_angle": run.frames.tangent_angle,
+        "center": run.frames.center,
+        "tension": run.frames.tension,
+    }
+    series = {name: NamedArray(("time",), values) for name, values in run.series.items()}
+    vesicle_series = {
+        name: NamedArray(("time", "vesicle", "axis")[: values.ndim], values)
+        for name, values in run.vesicle_series.items()
+    }
+    return (
+        series
+        | vesicle_series
+        | {name: NamedArray(FRAME_DIMENSIONS[name], values) for name, values in frames.items()}
+    )
+
+
+def rebuild(summary: RunSummary, read: Callable[[str], Array]) -> Run:
+    """Put a run together again from its summary and a function that reads an array by name."""
+    return Run(
+        **{name: getattr(summary, name) for name in RESULTS},
+        series={name: read(name) for name in summary.series},
+        vesicle_series={name: read(name) for name in summary.vesicle_series},
+        frames=Frames(
+            time=read("frame_time"),
+            tangent_angle=read("tangent_angle"),
+            center=read("center"),
+            tension=read("tension"),
+        ),
+    )

@@ -1,0 +1,1 @@
+"""What is measured along a run, and when and how a run is decided."""

@@ -1,0 +1,85 @@
+"""When a line in the plane has made each half turn."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from solver.integrators import Step
+from solver.membrane import curve
+from solver.membrane.geometry import Membranes
+
+Array = NDArray[np.float64]
+
+
+class Turns(ABC):
+    """Follows the angle of a line from step to step.
+
+    Attributes
+    ----------
+    angle : float
+        At the end of the last step; radians, unwrapped.
+    half_turns : list of float
+        ``half_turns[k]`` is when the line had first turned by kπ from its start, either way.
+    membranes : Membranes
+        Those of the steps; others may take their place.
+    """
+
+    ambiguity: float  # what the line may be turned by without a difference
+
+    def __init__(self, membranes: Membranes, state: Array) -> None:
+        self.membranes = membranes
+        self.angle = self._start = self._direction(state)
+        self.half_turns = [0.0]
+
+    @abstractmethod
+    def _direction(self, state: Array) -> float:
+        """Angle of the line up to the ambiguity."""
+
+    def advance(self, step: Step) -> Step:
+        """Follow one step; return the part followed."""
+        angle = self.angle_of(step.state)
+        while abs(angle - self._start) >= len(self.half_turns) * np.pi:
+            self.half_turns.append(crossing(step, self._excess_turn))
+        self.angle = angle
+        return step
+
+    def angle_of(self, state: Array) -> float:
+        """Angle of the line in a state less than half an ambiguity from the last step's."""
+        angle = self._direction(state)
+        return angle + self.ambiguity * round((self.angle - angle) / self.ambiguity)
+
+    @property
+    def period(self) -> float | None:
+        """Duration of the last full turn, None before there is one."""
+        return self.half_turns[-1] - self.half_turns[-3] if len(self.half_turns) > 2 else None
+
+    def _excess_turn(self, state: Array) -> float:
+        """How far the line has turned beyond the next half turn."""
+        return abs(self.angle_of(state) - self._start) - len(self.half_turns) * np.pi
+
+
+class LongAxis(Turns):
+    """The long principal axis of a single vesicle, which has no head."""
+
+    ambiguity = np.pi
+
+    def _direction(self, state: Array) -> float:
+        membranes = self.membranes
+        angle, center = membranes.tangent_angle(state), membranes.center(state)
+        return float(curve.inclination(curve.positions(angle, center, membranes.length))[0])
+
+
+def crossing(step: Step, excess: Callable[[Array], float]) -> float:
+    """When within a step the excess of a state becomes positive."""
+
+    def excess_at(time: float) -> float:
+        return excess(step.interpolate(time))
+
+    if excess_at(step.start) >= 0:  # the interpolant may differ from the previous one by the tolerance
+        return step.start
+    return float(brentq(excess_at, step.start, step.end, xtol=1e-12 * max(step.end, 1.0)))

@@ -1,0 +1,1 @@
+"""Imposed flows, one a module."""

@@ -1,0 +1,1 @@
+"""Forces on the membranes: bending, tension and adhesion."""

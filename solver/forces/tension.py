@@ -1,0 +1,223 @@
+"""Membrane tension from local inextensibility: x_s · u_s = 0.
+
+A tension σ exerts the force (σ x_s)_s; the velocity it causes must cancel the stretching that all other
+forces and the flow cause.  With T σ = (σ x_s)_s, S the single-layer potential and Div u = x_s · u_s,
+
+    A σ = Div u₀,   A = −Div S T.
+
+Since Div = −T* and S is symmetric and positive, so is A (weighted with the spacing): conjugate gradients,
+preconditioned with the dense inverse from the last Jacobian.  That inverse stays good while the membranes
+move, because A does not change when a membrane is turned or shifted.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import lapack
+
+from solver.compilation import compiled
+from solver.membrane.geometry import Geometry
+from solver.membrane.spectral import differentiation
+
+Array = NDArray[np.float64]
+
+ROUND_OFF = 1e-15  # the least `Inextensibility.elasticity` that means anything
+
+
+class TensionNotFoundError(ArithmeticError):
+    """The iteration for the tension did not converge."""
+
+
+class Mobility(Protocol):
+    """How point forces move the membranes: the single-layer potential, or what a contrast makes of it.
+
+    matrix : (2·M·N, 2·M·N), symmetric up to quadrature error
+    """
+
+    matrix: Array
+
+
+class Inextensible(NamedTuple):
+    """A motion that does not stretch the membranes.
+
+    tension : (M, N); velocity : (2, M, N); turning : (M, N)
+        The tension that achieves it, the velocity with it, and n · u_s, how fast the material turns.
+    """
+
+    tension: Array
+    velocity: Array
+    turning: Array
+
+
+@compiled
+def _conjugate_gradients(
+    layer: Array,
+    tangents: Array,
+    derivative: Array,
+    wavenumber: Array,
+    spacing: Array,
+    inverse: Array,
+    shift: float,
+    tolerance: float,
+    natural_rate: float,
+    limit: int,
+    imposed: Array,
+    tension: Array,
+    velocity: Array,
+    turning: Array,
+) -> int:
+    """Write what `Inextensible` holds; return the number of iterations, or −1 if ``limit`` was not enough.
+
+    ``layer`` is the matrix of the single-layer potential, ``derivative`` the transposed one of
+    differentiation; ``wavenumber`` (M, 1) = 2π/length; ``shift`` times the mean tension is added to A σ;
+    ``imposed`` (2, M, N) is the velocity u₀ without tension, and ``natural_rate`` a stretching that counts as
+    large.
+    """
+    count, points = tension.shape
+    size = count * points
+    weight = wavenumber * spacing
+    gradient = np.dot(imposed.reshape(2 * count, points), derivative).reshape(imposed.shape)
+    residual = ((tangents[0] * gradient[0] + tangents[1] * gradient[1]) * weight).reshape(size)
+    weights = natural_rate * spacing
+    natural = np.sqrt(points * np.sum(weights * weights))
+    goal = tolerance * max(np.sqrt(np.dot(residual, residual)), natural)
+    solution = np.zeros(size)
+    flow = imposed.copy().reshape(2 * size)
+    direction = np.dot(inverse, residual)
+    product = np.dot(residual, direction)
+    iteration = 0
+    while np.sqrt(np.dot(residual, residual)) > goal:
+        if iteration == limit:
+            return -1
+        iteration += 1
+        pull = (direction.reshape(count, points) * tangents).reshape(2 * count, points)
+        forces = np.dot(pull, derivative).reshape(imposed.shape) * weight
+        change = np.dot(layer, forces.reshape(2 * size))
+        gradient = np.dot(change.reshape(2 * count, points), derivative).reshape(imposed.shape)
+        image = (-(tangents[0] * gradient[0] + tangents[1] * gradient[1]) * weight).reshape(size)
+        for vesicle in range(count):
+            own = slice(vesicle * points, (vesicle + 1) * points)
+            image[own] += shift * direction[own].mean()
+        step = product / np.dot(direction, image)
+        solution += step * direction
+        flow += step * change
+        residual -= step * image
+        correction = np.dot(inverse, residual)
+        previous = product
+        product = np.dot(residual, correction)
+        direction = correction + (product / previous) * direction
+    tension[:] = solution.reshape(count, points)
+    velocity[:] = flow.reshape(imposed.shape)
+    gradient = np.dot(flow.reshape(2 * count, points), derivative).reshape(imposed.shape)
+    turning[:] = wavenumber * (tangents[0] * gradient[1] - tangents[1] * gradient[0])
+    return iteration
+
+
+class Inextensibility:
+    """Finds the tension of all membranes, and the motion with it.
+
+    Parameters
+    ----------
+    tolerance : float
+        Stretching left over, relative to that without tension or to `Membranes.natural_rate` if that is
+        larger: in a state of rest there is no other scale.
+    elasticity : float
+        How much a constant tension stretches a membrane, relative to a varying one.  On a circle such a
+        tension is a pressure that moves nothing: it must not be divided by round-off, nor by the error of
+        the sums over other membranes.  A vesicle whose ellipticity squared is below this gives way.
+
+    Attributes
+    ----------
+    inverse, shift
+        Of A, (M·N, M·N), as `factorize` last made it, and what times the mean tension of a vesicle is added
+        to it.
+    """
+
+    def __init__(self, tolerance: float, elasticity: float) -> None:
+        self.tolerance = tolerance
+        self.iterations = 0
+        self._elasticity = elasticity
+        self.inverse: Array | None = None
+        self.shift = 0.0
+
+    def solve(self, layer: Mobility, geometry: Geometry, imposed: Array) -> Inextensible:
+        """The motion when all forces but the tension, and the flow, cause the velocity ``imposed`` (2, M, N).
+
+        Raises
+        ------
+        TensionNotFoundError
+            If the iteration does not converge even with an inverse of this very geometry.
+        """
+        for inverse, limit in ((self.inverse, 25), (None, 200)):
+            if inverse is None:
+                self.factorize(layer, geometry)
+            membranes = geometry.membranes
+            found = Inextensible(
+                np.empty(imposed.shape[1:]), np.empty(imposed.shape), np.empty(imposed.shape[1:])
+            )
+            iterations = _conjugate_gradients(
+                layer.matrix,
+                geometry.tangents,
+                differentiation(membranes.points).T,
+                membranes.wavenumber,
+                membranes.spacing[:, None],
+                self.inverse,
+                self.shift,
+                self.tolerance,
+                membranes.natural_rate,
+                limit,
+                imposed,
+                *found,
+            )
+            if iterations >= 0:
+                self.iterations += iterations
+                return found
+        raise TensionNotFoundError("the tension could not be found: the membrane is too distorted")
+
+    def factorize(self, layer: Mobility, geometry: Geometry) -> tuple[Array, Array]:
+        """Make the dense inverse for this geometry.
+
+        Returns
+        -------
+        inverse : (M·N, M·N)
+            Of A, weighted with the spacing.
+        flow : (2, M·N, M·N)
+            S T, the velocity of each unit tension.
+        """
+        membranes = geometry.membranes
+        points, count = membranes.points, membranes.count
+        weighted = (2 * np.pi / points) * differentiation(points)  # spacing · ∂/∂s
+        of_tangents = (layer.matrix.reshape(-1, points) @ weighted).reshape(2, count * points, 2, -1)
+        of_tangents *= geometry.tangents.reshape(2, -1)
+        flow = of_tangents[:, :, 0] + of_tangents[:, :, 1]
+        system = self.stretching(geometry, flow)
+        system *= -np.repeat(membranes.spacing, points)[:, None]
+        typical = np.trace(system) / (count * points)
+        self.shift = self._elasticity * typical
+        # Differentiation loses the highest mode, whose tension gets the weight of its neighbors.
+        alternating = np.where(np.arange(points) % 2 == 0, 1.0, -1.0)
+        added = (self.shift + typical * np.outer(alternating, alternating)) / points
+        for vesicle in range(count):
+            block = slice(vesicle * points, (vesicle + 1) * points)
+            system[block, block] += added
+        # The lower triangle is used alone: the operator is symmetric up to quadrature error.
+        factor, failed = lapack.dpotrf(system.T, lower=0, overwrite_a=1)
+        if failed:
+            raise TensionNotFoundError("the tension operator is not positive: the membrane is too distorted")
+        triangle, _ = lapack.dpotri(factor, lower=0, overwrite_c=1)
+        inverse = np.triu(triangle)
+        inverse += np.triu(triangle, 1).T
+        self.inverse = np.ascontiguousarray(inverse)
+        return self.inverse, flow
+
+    @staticmethod
+    def stretching(geometry: Geometry, velocity: Array) -> Array:
+        """x_s · u_s for velocities (2, M·N, columns)."""
+        gradient = geometry.column_derivative(velocity)
+        gradient *= geometry.tangents.reshape(2, -1, 1)
+        gradient[0] += gradient[1]
+        stretching: Array = gradient[0]
+        return stretching

@@ -1,0 +1,1 @@
+"""A closed membrane: spectral tools, geometry, tangential velocity, symmetry and resampling."""

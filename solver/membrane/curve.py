@@ -1,0 +1,61 @@
+"""Closed curves of fixed length, given by tangent angle and center.
+
+A curve of length L carries the tangent angle θ at ``points`` equispaced arclength positions; its points are
+the center plus the zero-mean antiderivative of (cos θ, sin θ).  Length is exact by construction; area and
+closure are conserved only as accurately as the motion is computed, so their drifts measure the error.
+Curves run counterclockwise; the normal (−sin θ, cos θ) points inward.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.membrane.spectral import integration
+
+Array = NDArray[np.float64]
+
+
+def tangents(tangent_angle: Array) -> Array:
+    """Unit tangents, shape (..., 2, points)."""
+    return np.stack([np.cos(tangent_angle), np.sin(tangent_angle)], axis=-2)
+
+
+def positions(tangent_angle: Array, center: Array, length: float | Array) -> Array:
+    """Points of the curves, shape (..., 2, points).
+
+    Parameters
+    ----------
+    tangent_angle : (..., points)
+    center : (..., 2)
+    length : scalar or (...)
+        Perimeter of each curve.
+    """
+    matrix = integration(tangent_angle.shape[-1])
+    scale = np.asarray(length)[..., None, None] / (2 * np.pi)
+    points: Array = np.asarray(center)[..., None] + scale * (tangents(tangent_angle) @ matrix.T)
+    return points
+
+
+def area(points: Array, tangents: Array, length: float | Array) -> Array:
+    """Enclosed area ½∮(x dy − y dx) of curves, points and tangents of shape (..., 2, points).
+
+    It is taken about their centers, so a curve that does not quite close has the same area everywhere.
+    """
+    offsets = points - points.mean(axis=-1, keepdims=True)
+    moment = offsets[..., 0, :] * tangents[..., 1, :] - offsets[..., 1, :] * tangents[..., 0, :]
+    return 0.5 * np.asarray(length) * moment.mean(axis=-1)
+
+
+def closure(tangents: Array) -> Array:
+    """How far curves are from closing relative to their length, |mean of the tangent|, (..., 2, points)."""
+    return np.asarray(np.linalg.norm(tangents.mean(axis=-1), axis=-1))
+
+
+def inclination(points: Array) -> Array:
+    """Angle in (−π/2, π/2] of the long principal axis of curves of shape (..., 2, points) against x."""
+    offset = points - points.mean(axis=-1, keepdims=True)
+    xx = np.mean(offset[..., 0, :] ** 2, axis=-1)
+    yy = np.mean(offset[..., 1, :] ** 2, axis=-1)
+    xy = np.mean(offset[..., 0, :] * offset[..., 1, :], axis=-1)
+    return np.asarray(0.5 * np.arctan2(2 * xy, xx - yy))

@@ -1,0 +1,229 @@
+"""The membranes of a scene at one instant, as the arrays that every term works on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.compilation import compiled
+from solver.membrane.spectral import differentiation, integration
+from solver.membrane.symmetry import independent_vesicles
+from solver.scene import Scene, Vesicle
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Membranes:
+    """What stays the same during a run: M vesicles with N points each, and perhaps their images.
+
+    With ``copies`` = 2 every vesicle has an image (`symmetry`).  The C = copies·M curves in the fluid are
+    the vesicles and then the images, in the same order.
+
+    length, bending_modulus : (M,)
+    """
+
+    points: int
+    length: Array
+    bending_modulus: Array
+    copies: int = 1
+
+    @classmethod
+    def of(cls, vesicles: Sequence[Vesicle], points: int, copies: int = 1) -> Self:
+        """The membranes of these vesicles, sampled at ``points`` points each."""
+        return cls(
+            points,
+            np.array([vesicle.length for vesicle in vesicles]),
+            np.array([vesicle.bending_modulus for vesicle in vesicles]),
+            copies,
+        )
+
+    @classmethod
+    def of_scene(cls, scene: Scene) -> Self:
+        """The membranes that have to be computed for a scene whose number of points is given."""
+        vesicles, points = independent_vesicles(scene), scene.numerics.points
+        if points == "auto":
+            raise ValueError("numerics.points is 'auto': its number must have been chosen (see `resolution`)")
+        return cls.of(vesicles, points, len(scene.vesicles) // len(vesicles))
+
+    @property
+    def count(self) -> int:
+        """Number of vesicles."""
+        return len(self.length)
+
+    @property
+    def curves(self) -> int:
+        """Number of vesicles and images."""
+        return self.copies * self.count
+
+    @cached_property
+    def spacing(self) -> Array:
+        """Arclength between neighboring points, (M,)."""
+        return self.length / self.points
+
+    @cached_property
+    def curve_spacing(self) -> Array:
+        """`spacing` of all curves, (C,)."""
+        return np.tile(self.spacing, self.copies)
+
+    @cached_property
+    def wavenumber(self) -> Array:
+        """2π/length, (M, 1)."""
+        return 2 * np.pi / self.length[:, None]
+
+    @cached_property
+    def natural_rate(self) -> float:
+        """Slowest rate at which bending acts on a vesicle's own scale, modulus/(length/2π)³ (viscosity 1)."""
+        return float(np.min(self.bending_modulus * (2 * np.pi / self.length) ** 3))
+
+    @property
+    def state_size(self) -> int:
+        """Length of the state vector: per vesicle N tangent angles and 2 coordinates of the center."""
+        return self.count * (self.points + 2)
+
+    def pack(self, tangent_angle: Array, center: Array) -> Array:
+        """State vector of tangent angles (M, N) and centers (M, 2)."""
+        return np.concatenate([tangent_angle.ravel(), center.T.ravel()])
+
+    def tangent_angle(self, state: Array) -> Array:
+        """Tangent angles (..., M, N) of states (..., state_size)."""
+        size = self.count * self.points
+        return state[..., :size].reshape(*state.shape[:-1], self.count, self.points)
+
+    def center(self, state: Array) -> Array:
+        """Centers (..., M, 2) of states (..., state_size)."""
+        size = self.count * self.points
+        return state[..., size:].reshape(*state.shape[:-1], 2, self.count).swapaxes(-1, -2)
+
+    def curve_tangent_angle(self, state: Array) -> Array:
+        """Tangent angles of all curves, (..., C, N)."""
+        angle = self.tangent_angle(state)
+        return np.concatenate([angle, angle + np.pi], axis=-2) if self.copies == 2 else angle
+
+    def curve_center(self, state: Array) -> Array:
+        """Centers of all curves, (..., C, 2)."""
+        return self.with_images(self.center(state), axis=-2)
+
+    def with_images(self, vectors: Array, axis: int) -> Array:
+        """Vectors on the vesicles, and the opposite ones on the images, along the axis of the vesicles."""
+        return np.concatenate([vectors, -vectors], axis=axis) if self.copies == 2 else vectors
+
+    def fold(self, columns: Array) -> Array:
+        """Linear operators (..., M·N) that act on vesicles alone, from those on all curves (..., C·N).
+
+        What vectors on the images do is opposite to what the same vectors on the vesicles do.
+        """
+        size = self.count * self.points
+        return columns[..., :size] - columns[..., size:] if self.copies == 2 else columns
+
+
+@compiled
+def _place(
+    tangent_angle: Array, centers: Array, wavenumber: Array, integration: Array, copies: int
+) -> tuple[Array, Array, Array, Array]:
+    """Make the arrays of `Geometry`: tangents and points, of the vesicles and of all curves."""
+    count, n = tangent_angle.shape
+    tangents = np.empty((2, count, n))
+    for vesicle in range(count):
+        for j in range(n):
+            tangents[0, vesicle, j] = np.cos(tangent_angle[vesicle, j])
+            tangents[1, vesicle, j] = np.sin(tangent_angle[vesicle, j])
+    points = np.dot(tangents.reshape(2 * count, n), integration.T).reshape(2, count, n)
+    for component in range(2):
+        for vesicle in range(count):
+            for j in range(n):
+                points[component, vesicle, j] /= wavenumber[vesicle, 0]
+                points[component, vesicle, j] += centers[component, vesicle]
+    if copies == 1:
+        return tangents, points, tangents, points
+    curve_tangents, curve_points = np.empty((2, 2 * count, n)), np.empty((2, 2 * count, n))
+    curve_tangents[:, :count], curve_tangents[:, count:] = tangents, -tangents
+    curve_points[:, :count], curve_points[:, count:] = points, -points
+    return tangents, points, curve_tangents, curve_points
+
+
+@compiled
+def _radii(points: Array, centers: Array) -> Array:
+    """Make the `Geometry.radii` of points (2, M, N) about centers (2, M)."""
+    radii = np.empty(points.shape[1])
+    for vesicle in range(radii.size):
+        dx, dy = points[0, vesicle] - centers[0, vesicle], points[1, vesicle] - centers[1, vesicle]
+        radii[vesicle] = np.sqrt(np.max(dx * dx + dy * dy))
+    return radii
+
+
+class Geometry:
+    """Points and tangents of all membranes in one state.
+
+    Attributes
+    ----------
+    tangents, points : (2, M, N)
+    curve_tangents, curve_points : (2, C, N)
+        With the images.
+    """
+
+    def __init__(self, membranes: Membranes, state: Array) -> None:
+        self.membranes = membranes
+        self.tangent_angle = membranes.tangent_angle(state)
+        self.centers = state[self.tangent_angle.size :].reshape(2, membranes.count)
+        self.tangents, self.points, self.curve_tangents, self.curve_points = _place(
+            self.tangent_angle,
+            self.centers,
+            membranes.wavenumber,
+            integration(membranes.points),
+            membranes.copies,
+        )
+
+    @property
+    def normals(self) -> Array:
+        """Inward unit normals, (2, M, N)."""
+        return np.stack([-self.tangents[1], self.tangents[0]])
+
+    @cached_property
+    def radii(self) -> Array:
+        """Of the circles about the centers that hold each vesicle's points, (M,)."""
+        return np.asarray(_radii(self.points, self.centers))
+
+    @cached_property
+    def curvature(self) -> Array:
+        """θ_s, (M, N); positive for a circle."""
+        points, wavenumber = self.membranes.points, self.membranes.wavenumber
+        periodic = self.tangent_angle - 2 * np.pi * np.arange(points) / points
+        return wavenumber * (1 + periodic @ differentiation(points).T)
+
+    def arclength_derivative(self, values: Array, order: int = 1) -> Array:
+        """∂^order/∂s^order of values (..., M, N)."""
+        points = self.membranes.points
+        derivative: Array = values.reshape(-1, points) @ differentiation(points, order).T
+        derivative = derivative.reshape(values.shape)
+        derivative *= self.membranes.wavenumber**order
+        return derivative
+
+    def by_state(self, by_points: Array) -> Array:
+        """Derivatives by the state, (2, rows, state_size), from those by the points, (2, rows, 2, M·N).
+
+        A tangent angle moves all points of its vesicle, x_θ = ∫(−sin θ, cos θ) ds; a center moves them alike.
+        """
+        count, points = self.membranes.count, self.membranes.points
+        size, rows = count * points, by_points.shape[1]
+        result = np.empty((2, rows, self.membranes.state_size))
+        integrated = (by_points.reshape(-1, points) @ integration(points)).reshape(2, rows, 2, size)
+        scaled_x, scaled_y = (self.tangents / self.membranes.wavenumber).reshape(2, -1)
+        turned = result[:, :, :size]
+        np.multiply(integrated[:, :, 1], scaled_x, out=turned)
+        integrated[:, :, 0] *= scaled_y
+        turned -= integrated[:, :, 0]
+        result[:, :, size:] = by_points.reshape(2, rows, 2 * count, points).sum(axis=3)
+        return result
+
+    def column_derivative(self, values: Array) -> Array:
+        """∂/∂s of the columns of vector fields (2, M·N, columns)."""
+        count, points = self.membranes.count, self.membranes.points
+        derivative: Array = differentiation(points) @ values.reshape(2, count, points, -1)
+        derivative *= self.membranes.wavenumber[:, :, None]
+        return derivative.reshape(values.shape)

@@ -1,0 +1,1 @@
+"""The equation of motion: how tangent angles and centers change."""

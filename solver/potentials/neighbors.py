@@ -1,0 +1,137 @@
+"""Which vesicles are near each other, found in a time that grows like their number."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from solver.compilation import compiled
+from solver.membrane.geometry import Geometry
+from solver.membrane.spectral import interpolation, interpolations
+from solver.potentials.refinement import MAXIMUM_FACTOR, Refinement, group_targets
+from solver.potentials.stokeslets import distances
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+
+@compiled
+def _near_distances(
+    points: Array,
+    tangents: Array,
+    spacing: Array,
+    centers: Array,
+    radii: Array,
+    pairs: Indices,
+    reach: Array,
+    out: Array,
+) -> None:
+    """Write the `distances` (k, N) of the target's points to the source for each of ``pairs`` (k, 2).
+
+    Infinite where the point is not within ``reach`` (k,) of the circle about the source.
+    """
+    for pair in range(pairs.shape[0]):
+        target, source = pairs[pair]
+        limit = (radii[source] + reach[pair]) ** 2
+        dx = points[0, target] - centers[0, source]
+        dy = points[1, target] - centers[1, source]
+        rows = np.flatnonzero(dx * dx + dy * dy <= limit)
+        out[pair] = np.inf
+        if rows.size == 0:
+            continue
+        found = np.empty(rows.size)
+        distances(points[:, target][:, rows], points[:, source], tangents[:, source], spacing[source], found)
+        for k in range(rows.size):
+            if found[k] <= reach[pair]:
+                out[pair, rows[k]] = found[k]
+
+
+class Neighbors:
+    """Pairs of vesicles that are near each other.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        Without images.
+    reach : float
+        How near, in spacings of the source.
+
+    Attributes
+    ----------
+    pairs : (k, 2)
+        Target and source; every pair is there both ways, where any target is within reach.
+    distances : (k, N)
+        Distance over the source's spacing of each point of the target, infinite beyond reach.
+    nearest, smallest_distance : float
+        The smallest of them, and the smallest distance; infinite if there is none.
+    """
+
+    def __init__(self, geometry: Geometry, reach: float) -> None:
+        membranes = geometry.membranes
+        self._points, self._curves = membranes.points, membranes.count
+        centers, radii = geometry.centers, geometry.radii
+        allowed = reach * membranes.spacing
+        # Points see the curve between them at most half a spacing nearer than its points.
+        found = cKDTree(centers.T).query_pairs(
+            2 * radii.max() + allowed.max() + membranes.spacing.max(), output_type="ndarray"
+        )
+        pairs = np.concatenate([found, found[:, ::-1]]).astype(np.int64)
+        apart = np.linalg.norm(centers[:, pairs[:, 0]] - centers[:, pairs[:, 1]], axis=0)
+        touching = apart <= radii[pairs].sum(axis=1) + allowed[pairs[:, 1]] + membranes.spacing.max()
+        pairs = pairs[touching]
+        # In an order that does not depend on how the tree was searched.
+        pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
+        values = np.empty((len(pairs), self._points))
+        _near_distances(
+            geometry.points,
+            geometry.tangents,
+            membranes.spacing,
+            centers,
+            radii + 0.5 * membranes.spacing,
+            pairs,
+            allowed[pairs[:, 1]],
+            values,
+        )
+        near = np.isfinite(values).any(axis=1)
+        self.pairs = pairs[near]
+        self.smallest_distance = float(values.min(initial=np.inf))
+        self.distances = values[near] / membranes.spacing[self.pairs[:, 1], None]
+        self.nearest = float(self.distances.min(initial=np.inf))
+
+    def refinement(self, ratio: float, limits: Array | None = None) -> Refinement:
+        """See `proximity.Proximity`.  Without limits, without the targets that need none.
+
+        ``ratio`` and ``limits`` are at most the reach.
+        """
+        factor = 1
+        while factor < MAXIMUM_FACTOR and factor * self.nearest < ratio:
+            factor *= 2
+        limits = np.full(self._curves, ratio) if limits is None else limits
+        groups, rows, starts = group_targets(self.pairs, self.distances, ratio, limits)
+        return Refinement(groups, rows, starts, interpolations(self._points, factor))
+
+
+def smallest_gap(geometry: Geometry, refinement: int) -> float:
+    """Smallest distance between two membranes, seen at ``refinement`` times as many points."""
+    membranes = geometry.membranes
+    reach = 2.0
+    while not len((near := Neighbors(geometry, reach)).pairs):
+        reach *= 2.0
+    # Distances between points as they are differ by less than a spacing from those between more points.
+    limit = near.smallest_distance + membranes.spacing.max()
+    near = Neighbors(geometry, limit / membranes.spacing.min())
+    matrix = interpolation(membranes.points, refinement).T
+    found = np.empty((len(near.pairs), refinement * membranes.points))
+    everywhere = np.full(len(near.pairs), np.inf)
+    _near_distances(
+        geometry.points @ matrix,
+        geometry.tangents @ matrix,
+        membranes.spacing / refinement,
+        geometry.centers,
+        np.full(membranes.count, np.inf),
+        near.pairs,
+        everywhere,
+        found,
+    )
+    return float(found.min())

@@ -1,0 +1,146 @@
+"""Refining a vesicle's points for the targets that are close to it.
+
+The trapezoid rule over one membrane is accurate at a target that is a few spacings away (`quadrature`).  For
+nearer ones the membrane is interpolated to a power of two times as many points, decided target by target.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.compilation import compiled
+from solver.potentials.stokeslets import stokeslets
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+MAXIMUM_FACTOR = 32  # beyond it the adhesion of a close target is not resolved
+LARGEST_REFINED = 4  # factor up to which refining serves the single layer; measured: from 8 on it is slower
+
+
+class Refinement(NamedTuple):
+    """Which targets see which vesicle at which factor.
+
+    groups : (k, 3)
+        Target vesicle, source curve and factor of each group of targets; a target is in at most one group of
+        every other curve.
+    rows, starts : (·,), (k + 1,)
+        ``rows[starts[g]:starts[g + 1]]`` are the points of group g within their vesicle.
+    interpolations : (·, n)
+        `spectral.interpolations` up to the largest factor.
+    """
+
+    groups: Indices
+    rows: Indices
+    starts: Indices
+    interpolations: Array
+
+
+@compiled
+def refinement_factors(distance_per_spacing: Array, ratio: float) -> Indices:
+    """Least powers of two, at most 32, that times the distance/spacing (n,) of each point reach ``ratio``."""
+    factors = np.ones(distance_per_spacing.size, dtype=np.int64)
+    for i in range(factors.size):
+        while factors[i] < MAXIMUM_FACTOR and factors[i] * distance_per_spacing[i] < ratio:
+            factors[i] *= 2
+    return factors
+
+
+@compiled
+def group_targets(
+    pairs: Indices, distances: Array, ratio: float, limits: Array
+) -> tuple[Indices, Indices, Indices]:
+    """Make the groups, rows and starts of a `Refinement`.
+
+    pairs : (k, 2)
+        Target vesicle and source curve.
+    distances : (k, n)
+        Distance over spacing, by pair and point of the target.
+    limits : (C,)
+        Points at this distance from a source curve, or beyond, are left out.
+    """
+    groups = [(0, 0, 0)][:0]
+    rows = np.empty(distances.size, dtype=np.int64)
+    starts = [0]
+    used = 0
+    for pair in range(pairs.shape[0]):
+        target, source = pairs[pair]
+        factors = refinement_factors(distances[pair], ratio)
+        for i in range(factors.size):
+            if distances[pair, i] >= limits[source]:
+                factors[i] = 0
+        factor = 1
+        while factor <= factors.max():
+            found = np.flatnonzero(factors == factor)
+            if found.size > 0:
+                rows[used : used + found.size] = found
+                used += found.size
+                groups.append((target, source, factor))
+                starts.append(used)
+            factor *= 2
+    table = np.empty((len(groups), 3), dtype=np.int64)
+    for g in range(len(groups)):
+        table[g, 0], table[g, 1], table[g, 2] = groups[g]
+    return table, rows[:used], np.array(starts)
+
+
+def within(refinement: Refinement, own: slice, size: int) -> Refinement:
+    """The part of a refinement that concerns the points ``own`` of all ``size``."""
+    if own == slice(0, size):
+        return refinement
+    sizes = np.diff(refinement.starts)
+    group = np.repeat(np.arange(sizes.size), sizes)
+    rows = refinement.rows[: group.size]
+    point = refinement.groups[group, 0] * refinement.interpolations.shape[1] + rows
+    inside = (own.start <= point) & (point < own.stop)
+    sizes = np.bincount(group[inside], minlength=sizes.size)
+    starts = np.concatenate([[0], np.cumsum(sizes[sizes > 0])])
+    return Refinement(refinement.groups[sizes > 0], rows[inside], starts, refinement.interpolations)
+
+
+def sum_costs(refinement: Refinement, costs: Array, size: int) -> Array:
+    """Sum for each of ``size`` points the costs (k,) of being in each group, (size,)."""
+    sizes = np.diff(refinement.starts)
+    group = np.repeat(np.arange(sizes.size), sizes)
+    point = refinement.groups[group, 0] * refinement.interpolations.shape[1] + refinement.rows[: group.size]
+    return np.bincount(point, weights=costs[group], minlength=size).astype(np.float64)
+
+
+@compiled
+def interpolation_to(refinement: Refinement, factor: int) -> Array:
+    """The interpolation matrix (factor·n, n) for a factor of at least 2."""
+    n = refinement.interpolations.shape[1]
+    return refinement.interpolations[(factor - 2) * n : (2 * factor - 2) * n]
+
+
+@compiled
+def refined_points(points: Array, source: int, factor: int, refinement: Refinement) -> Array:
+    """Points (2, factor·n) of one of the curves ``points`` (2, C, n)."""
+    coarse = np.ascontiguousarray(points[:, source])
+    return coarse if factor == 1 else np.dot(coarse, interpolation_to(refinement, factor).T)
+
+
+@compiled
+def refine_single_layer(points: Array, refinement: Refinement, components: Array, first: int) -> None:
+    """Replace the rows of components (3, ·, C·n) for targets that need a factor of 2 or 4.
+
+    The rows begin with the point ``first``.  Refined columns are folded back.  For closer targets
+    `close_evaluation` costs less.
+    """
+    n = points.shape[2]
+    for g in range(refinement.groups.shape[0]):
+        target, source, factor = refinement.groups[g]
+        if factor == 1 or factor > LARGEST_REFINED:
+            continue
+        rows = refinement.rows[refinement.starts[g] : refinement.starts[g + 1]]
+        fine = refined_points(points, source, factor, refinement)
+        refined = np.empty((3, rows.size, fine.shape[1]))
+        stokeslets(points[:, target][:, rows], fine, refined)
+        for component in range(3):
+            folded = np.dot(refined[component], interpolation_to(refinement, factor))
+            for k in range(rows.size):
+                row = target * n + rows[k] - first
+                components[component, row, source * n : (source + 1) * n] = folded[k] / factor

@@ -1,0 +1,174 @@
+"""Sums over pairs of membrane points, compiled."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.compilation import compiled, widest_vectors
+from solver.potentials.logarithm import LOGARITHM_UNIT, logarithm_and_reciprocal
+
+Array = NDArray[np.float64]
+
+
+@compiled
+def stokeslets(targets: Array, sources: Array, components: Array) -> None:
+    """Fill the components xx, xy, yy (3, m, n) of (−log r I + r⊗r/r²)/4π between points.
+
+    ``targets`` are (2, m), ``sources`` (2, n).  Where a target is its own source the entries are meaningless
+    and the caller's to overwrite.
+    """
+    widest_vectors()
+    radial = 1.0 / (4.0 * np.pi)
+    isotropic = -0.5 * LOGARITHM_UNIT * radial
+    source_x, source_y = sources[0], sources[1]
+    for i in range(targets.shape[1]):
+        xi, yi = targets[0, i], targets[1, i]
+        # As rows: indexed in three dimensions the loop is not turned into SIMD code.
+        xx, xy, yy = components[0, i], components[1, i], components[2, i]
+        for j in range(source_x.size):
+            dx = xi - source_x[j]
+            dy = yi - source_y[j]
+            logarithm, reciprocal = logarithm_and_reciprocal(dx * dx + dy * dy)
+            inverse = radial * reciprocal
+            diagonal = isotropic * logarithm
+            xx[j] = diagonal + dx * dx * inverse
+            xy[j] = dx * dy * inverse
+            yy[j] = diagonal + dy * dy * inverse
+
+
+@compiled
+def complete_self_parts(
+    correction: Array, diagonal: Array, tangents: Array, components: Array, begin: int
+) -> None:
+    """Turn point Stokeslets of closed curves on themselves into their single-layer quadrature.
+
+    Parameters
+    ----------
+    correction : (n, n)
+        What Kress's rule adds off the diagonal (`close_evaluation.logarithm_correction`).
+    diagonal : (M,)
+        The whole logarithmic part on the diagonal, over 4π.
+    tangents : (2, M, n)
+    components : (3, m, ·)
+        Of `stokeslets` at m points from ``begin`` on; the sources begin with all M·n points.
+    """
+    scale = 1.0 / (4.0 * np.pi)
+    n = tangents.shape[2]
+    for row in range(components.shape[1]):
+        point = begin + row
+        vesicle, i = point // n, point % n
+        first = vesicle * n
+        for j in range(n):
+            components[0, row, first + j] += correction[i, j]
+        for j in range(n):
+            components[2, row, first + j] += correction[i, j]
+        tx, ty = tangents[0, vesicle, i], tangents[1, vesicle, i]
+        components[0, row, point] = diagonal[vesicle] + scale * tx * tx
+        components[1, row, point] = scale * tx * ty
+        components[2, row, point] = diagonal[vesicle] + scale * ty * ty
+
+
+@compiled
+def join_components(components: Array, matrix: Array) -> None:
+    """Write the components (3, m, n) into one matrix (2m, 2m).
+
+    Columns beyond m belong to images, on which forces are opposite.
+    """
+    m = components.shape[1]
+    for block, component in ((0, 0), (1, 1), (2, 1), (3, 2)):
+        row, column = block // 2 * m, block % 2 * m
+        for i in range(m):
+            for j in range(m):
+                matrix[row + i, column + j] = components[component, i, j]
+            for image in range(m, components.shape[2]):
+                matrix[row + i, column + image - m] -= components[component, i, image]
+
+
+@compiled
+def stokeslet_derivatives(points: Array, forces: Array, by_points: Array, first: int) -> None:
+    """Fill the derivatives (2, m, 2, n) of the velocity at m of ``points`` (2, n) by all of them.
+
+    The m points are those from ``first`` on.  The velocity is the sum of Stokeslets of strength ``forces``
+    (2, n) at the points; with r = x − y and
+    g = F·r, moving r by δ changes one of them by
+    [−F (r·δ) + r (F·δ) + g δ − 2 g r (r·δ)/r²]/(4π r²).
+    """
+    scale = 1.0 / (4.0 * np.pi)
+    for i in range(by_points.shape[1]):
+        xi, yi = points[0, first + i], points[1, first + i]
+        for j in range(points.shape[1]):
+            dx = xi - points[0, j]
+            dy = yi - points[1, j]
+            fx, fy = forces[0, j], forces[1, j]
+            r2 = dx * dx + dy * dy
+            inverse = scale / (r2 if r2 > 0.0 else np.inf)
+            along = dx * fx + dy * fy
+            pull = 2.0 * along * inverse * inverse * (1.0 / scale)
+            by_points[0, i, 0, j] = -along * inverse + pull * dx * dx
+            by_points[0, i, 1, j] = (fx * dy - dx * fy) * inverse + pull * dx * dy
+            by_points[1, i, 0, j] = (fy * dx - dy * fx) * inverse + pull * dx * dy
+            by_points[1, i, 1, j] = -along * inverse + pull * dy * dy
+        for component in range(2):
+            for coordinate in range(2):
+                by_points[component, i, coordinate, first + i] -= by_points[component, i, coordinate].sum()
+
+
+@compiled
+def distances(targets: Array, sources: Array, tangents: Array, spacing: float, out: Array) -> None:
+    """Distance of every target (2, m) to the curve through ``sources`` (2, n), to order ``spacing``².
+
+    The curve is replaced by its tangent segments of length ``spacing`` at the nearest point.
+    """
+    for i in range(targets.shape[1]):
+        xi, yi = targets[0, i], targets[1, i]
+        nearest = np.inf
+        for j in range(sources.shape[1]):
+            dx = xi - sources[0, j]
+            dy = yi - sources[1, j]
+            nearest = min(nearest, dx * dx + dy * dy)
+        for j in range(sources.shape[1]):
+            dx = xi - sources[0, j]
+            dy = yi - sources[1, j]
+            if dx * dx + dy * dy <= nearest:
+                along = abs(dx * tangents[0, j] + dy * tangents[1, j])
+                inside = min(along, 0.5 * spacing)
+                out[i] = np.sqrt(max(nearest - along * along, 0.0) + (along - inside) ** 2)
+                break
+
+
+@compiled
+def waists(points: Array) -> Array:
+    """Smallest distance (M,) between points (2, M, n) of a curve that lie at least an eighth of it apart."""
+    count, n = points.shape[1], points.shape[2]
+    out = np.empty(count)
+    apart = n // 8
+    for vesicle in range(count):
+        nearest = np.inf
+        for i in range(n):
+            for j in range(i + apart, min(n, i + n - apart + 1)):
+                dx = points[0, vesicle, i] - points[0, vesicle, j]
+                dy = points[1, vesicle, i] - points[1, vesicle, j]
+                nearest = min(nearest, dx * dx + dy * dy)
+        out[vesicle] = np.sqrt(nearest)
+    return out
+
+
+@compiled
+def pair_distances(points: Array, tangents: Array, spacing: Array, count: int) -> Array:
+    """`distances` for all ordered pairs: [a, b, i] is that of point i of curve a < ``count`` to curve b.
+
+    points, tangents : (2, C, N); spacing : (C,); returns (count, C, N), infinite from a curve to itself
+    """
+    out = np.full((count, points.shape[1], points.shape[2]), np.inf)
+    for target in range(count):
+        for source in range(points.shape[1]):
+            if target != source:
+                distances(
+                    points[:, target],
+                    points[:, source],
+                    tangents[:, source],
+                    spacing[source],
+                    out[target, source],
+                )
+    return out

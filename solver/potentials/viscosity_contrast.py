@@ -1,0 +1,85 @@
+"""Fluids inside the vesicles whose viscosity differs from that outside (Pozrikidis 1992, section 5.3).
+
+With viscosity 1 outside and λ_k inside vesicle k, the velocity v = u_∞ + S f of equal viscosities becomes,
+by the double-layer potentials of all, on vesicle j
+
+    ½(1 + λ_j) u = v + Σ_k (1 − λ_k) D_k u,   K u = v.
+
+The mobility K⁻¹S that takes the place of S is symmetric as S is, by the reciprocal theorem.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import lapack
+
+from solver.membrane.geometry import Geometry, Membranes
+from solver.potentials.double_layer import DoubleLayer
+from solver.potentials.proximity import Closeness
+from solver.potentials.single_layer import SingleLayer
+from solver.scene import Vesicle
+
+Array = NDArray[np.float64]
+
+
+class ViscosityContrast:
+    """What viscosities inside the vesicles change of the motion that forces and flow cause.
+
+    Parameters
+    ----------
+    contrast : (M,)
+        Viscosities inside.
+    membranes : Membranes
+    accuracy : float
+        As for `SingleLayer`.
+
+    Attributes
+    ----------
+    matrix : (2·M·N, 2·M·N)
+        The mobility K⁻¹S, from point forces to velocities as the matrix of `SingleLayer`.
+    """
+
+    def __init__(self, contrast: Array, membranes: Membranes, accuracy: float) -> None:
+        self._double_layer = DoubleLayer(membranes, accuracy)
+        points = membranes.points
+        self._excess = 1 - contrast
+        self._mean = np.tile(np.repeat((1 + contrast) / 2, points), 2)
+        self._weights = np.tile(np.repeat(self._excess, points), 2)
+
+    def assemble(self, geometry: Geometry, closeness: Closeness | None, layer: SingleLayer) -> None:
+        """Factorize K and fill the matrix; ``layer`` is assembled for the same geometry."""
+        self._double_layer.assemble(geometry, closeness, layer.matrix)
+        system = self._double_layer.matrix * -self._weights
+        system[np.diag_indices_from(system)] += self._mean
+        self._factors, self._pivots, _ = lapack.dgetrf(system.T, overwrite_a=1)
+        self.matrix = self._solve(layer.matrix)
+
+    def velocity(self, unchanged: Array) -> Array:
+        """The velocity (2, M, N), or velocities (2, M·N, columns), for those at equal viscosities."""
+        return self._solve(unchanged.reshape(len(self._mean), -1)).reshape(unchanged.shape)
+
+    def jacobian(self, geometry: Geometry, velocity: Array) -> Array:
+        """What a change of the state changes of Σ (1 − λ) D u, (2, M·N, state_size), at fixed u (2, M, N)."""
+        return self._double_layer.jacobian(geometry, velocity * self._excess[:, None])
+
+    def stress(self, geometry: Geometry, velocity: Array) -> float:
+        """∫ (λ − 1)(u_x n_y + u_y n_x) ds over all membranes, n outward: the shear stress it adds.
+
+        Batchelor (J. Fluid Mech. 41, 545, 1970): the fluid inside takes the stress of its own viscosity.
+        """
+        inward = geometry.normals
+        strain = np.sum(velocity[0] * inward[1] + velocity[1] * inward[0], axis=1)
+        return float(geometry.membranes.copies * np.sum(self._excess * strain * geometry.membranes.spacing))
+
+    def _solve(self, right: Array) -> Array:
+        # The factors are of the transposed matrix: LAPACK counts rows and columns the other way.
+        solution, _ = lapack.dgetrs(self._factors, self._pivots, right, trans=1)
+        return np.ascontiguousarray(solution)
+
+
+def contrasts(vesicles: Sequence[Vesicle]) -> Array:
+    """Viscosity contrasts (M,) of vesicles."""
+    return np.array([vesicle.viscosity_contrast for vesicle in vesicles])

@@ -1,0 +1,125 @@
+"""Many vesicles in a few lines: what a scene may hold instead of its list of vesicles.
+
+It is turned into that list when the scene is checked, so nothing else ever meets an arrangement.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from pydantic import Field, field_validator, model_validator
+
+from solver.scene.distribution import Distribution, Normal, Uniform, drawn, ends
+from solver.scene.ellipses import semi_axes
+from solver.scene.model import Model, Positive
+from solver.scene.placement import placed_at_random
+from solver.scene.vesicle import Vesicle
+
+MOST_VESICLES = 4096
+
+
+class Lattice(Model):
+    """Equal vesicles in columns and rows about the origin, at equal distances, all turned alike."""
+
+    kind: Literal["lattice"] = "lattice"
+    columns: int = Field(ge=1, le=MOST_VESICLES)
+    rows: int = Field(ge=1, le=MOST_VESICLES)
+    spacing: tuple[Positive, Positive]  # of neighboring centers along x and y
+    staggered: bool = False  # every second row shifted by half a spacing
+    vesicle: Vesicle = Vesicle()  # at whose center the lattice lies
+
+    @model_validator(mode="after")
+    def _not_too_many(self) -> Self:
+        if self.count > MOST_VESICLES:
+            raise ValueError(f"columns times rows must be at most {MOST_VESICLES}, got {self.count}")
+        return self
+
+    @property
+    def count(self) -> int:
+        """Number of vesicles."""
+        return self.columns * self.rows
+
+    def vesicles(self) -> tuple[Vesicle, ...]:
+        """The vesicles, row by row from below."""
+        across, up = self.spacing
+        found = []
+        for row in range(self.rows):
+            shift = 0.25 * across * (-1 if row % 2 else 1) if self.staggered else 0.0
+            for column in range(self.columns):
+                x = (column - (self.columns - 1) / 2) * across + shift
+                y = (row - (self.rows - 1) / 2) * up
+                center = (self.vesicle.center[0] + x, self.vesicle.center[1] + y)
+                found.append(self.vesicle.model_copy(update={"center": center}))
+        return tuple(found)
+
+
+class Random(Model):
+    """Vesicles at random places in a square about the origin, none nearer to another than stated.
+
+    Equal arrangements, seed included, are equal vesicles.
+    """
+
+    kind: Literal["random"] = "random"
+    count: int = Field(ge=1, le=MOST_VESICLES)
+    area_fraction: float = Field(gt=0, lt=1)  # of the square that the vesicles lie in
+    seed: int = Field(0, ge=0)
+    minimum_distance: Positive = 0.2
+    reduced_area: Distribution = 0.9
+    length: Distribution = 2 * math.pi
+    angle: float | None = None  # of the long axes against x, radians; None: random
+    bending_modulus: Positive = 1.0
+    viscosity_contrast: Positive = 1.0  # of the fluid inside to that outside
+
+    @field_validator("reduced_area")
+    @classmethod
+    def _possible_reduced_areas(cls, reduced_area: float | Uniform | Normal) -> float | Uniform | Normal:
+        low, high = ends(reduced_area)
+        if not 0 < low <= high <= 1:
+            raise ValueError(
+                f"reduced areas must lie above 0 and be at most 1, these are {low:g} to {high:g}"
+            )
+        return reduced_area
+
+    @field_validator("length")
+    @classmethod
+    def _positive_lengths(cls, length: float | Uniform | Normal) -> float | Uniform | Normal:
+        if not ends(length)[0] > 0:
+            raise ValueError(f"lengths must be positive, the least of these is {ends(length)[0]:g}")
+        return length
+
+    @model_validator(mode="after")
+    def _room_for_all(self) -> Self:
+        self.vesicles()
+        return self
+
+    def vesicles(self) -> tuple[Vesicle, ...]:
+        """The vesicles, in no particular order of place or size."""
+        return _drawn(self)
+
+
+@lru_cache(maxsize=32)  # a scene is checked more than once on its way
+def _drawn(arrangement: Random) -> tuple[Vesicle, ...]:
+    count, random = arrangement.count, np.random.default_rng(arrangement.seed)
+    reduced_area = drawn(arrangement.reduced_area, count, random)
+    length = drawn(arrangement.length, count, random)
+    axes = np.array([semi_axes(*shape) for shape in zip(reduced_area, length, strict=True)])
+    area = float(np.sum(reduced_area * length**2) / (4 * np.pi))
+    side = math.sqrt(area / arrangement.area_fraction)
+    center, angle = placed_at_random(axes, side, arrangement.minimum_distance, arrangement.angle, random)
+    return tuple(
+        Vesicle(
+            reduced_area=float(reduced_area[index]),
+            length=float(length[index]),
+            bending_modulus=arrangement.bending_modulus,
+            viscosity_contrast=arrangement.viscosity_contrast,
+            center=(float(center[index].real), float(center[index].imag)),
+            angle=float(angle[index]),
+        )
+        for index in range(count)
+    )
+
+
+Arrangement = Annotated[Lattice | Random, Field(discriminator="kind")]

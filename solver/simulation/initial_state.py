@@ -1,0 +1,37 @@
+"""The state in which a run begins."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.membrane.geometry import Membranes
+from solver.membrane.shapes import ellipse_tangent_angle, of_reduced_area
+from solver.membrane.symmetry import independent_vesicles
+from solver.scene import Scene
+
+Array = NDArray[np.float64]
+
+
+def placed_state(scene: Scene) -> Array:
+    """Ellipses where the scene places them."""
+    vesicles, membranes = independent_vesicles(scene), Membranes.of_scene(scene)
+    tangent_angle = [
+        of_reduced_area(
+            ellipse_tangent_angle(vesicle.reduced_area, vesicle.length, vesicle.angle, membranes.points),
+            vesicle.reduced_area,
+        )
+        for vesicle in vesicles
+    ]
+    center = [vesicle.center for vesicle in vesicles]
+    return membranes.pack(np.array(tangent_angle), np.array(center))
+
+
+def turned_state(membranes: Membranes, state: Array, tilt: float) -> Array:
+    """Two vesicles about the origin with their line of centers along y, plus ``tilt`` radians."""
+    tangent_angle, center = membranes.tangent_angle(state), membranes.center(state)
+    first, second = membranes.curve_center(state)
+    offset = second - first
+    turn = np.pi / 2 + tilt - np.arctan2(offset[1], offset[0])
+    rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    return membranes.pack(tangent_angle + turn, (center - 0.5 * (first + second)) @ rotation.T)

@@ -1,0 +1,81 @@
+"""The part of a run that has one number of points."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.analysis.diagnostics import conserved_quantities
+from solver.integrators import Integrator, Step, integrator_for
+from solver.membrane.geometry import Geometry, Membranes
+from solver.motion.equation import equation_of_motion
+from solver.parallel import Parallel
+from solver.scene import Scene
+
+Array = NDArray[np.float64]
+
+
+class Cost(NamedTuple):
+    """What a run has cost so far."""
+
+    evaluations: int = 0
+    jacobians: int = 0
+    factorizations: int = 0
+    tension_iterations: int = 0
+
+
+class Stage:
+    """The part of a run that has one number of points.
+
+    Parameters
+    ----------
+    scene : Scene
+        With that number.
+    before : Cost
+        Of the parts before this one.
+    parallel : Parallel
+        The ranks that compute it together.
+    """
+
+    def __init__(self, scene: Scene, before: Cost, parallel: Parallel) -> None:
+        self.dynamics = equation_of_motion(scene, parallel)
+        self._scene = scene
+        self._before = before
+        self._integrator: Integrator | None = None
+
+    @property
+    def membranes(self) -> Membranes:
+        """What stays the same while this part lasts."""
+        return self.dynamics.membranes
+
+    def begin(self, time: float, state: Array, latest: float) -> None:
+        """Make the integrator that goes on from this state, until ``latest`` at most."""
+        self._integrator = integrator_for(
+            self._scene.numerics,
+            len(self._scene.vesicles),
+            self.dynamics.rate,
+            self.dynamics.jacobian,
+            lambda state: conserved_quantities(Geometry(self.membranes, state)),
+            state,
+            latest,
+            time,
+            block_diagonal=self._scene.many,
+        )
+
+    def step(self) -> Step:
+        """Take one step."""
+        assert self._integrator
+        return self._integrator.step()
+
+    @property
+    def cost(self) -> Cost:
+        """What the run has cost up to now."""
+        integrator = self._integrator
+        return Cost(
+            self._before.evaluations + self.dynamics.evaluations,
+            self._before.jacobians + (integrator.jacobian_evaluations if integrator else 0),
+            self._before.factorizations + (integrator.factorizations if integrator else 0),
+            self._before.tension_iterations + self.dynamics.inextensibility.iterations,
+        )

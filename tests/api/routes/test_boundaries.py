@@ -1,0 +1,124 @@
+"""Boundaries over HTTP, and critical values read off them."""
+
+from __future__ import annotations
+
+import pytest
+
+from ensemble.search.boundary import Boundary
+from ensemble.store import Store
+from tests.api.servers import client_of
+from tests.api.stores import SWEEP, critical, made_up_boundary
+
+
+@pytest.fixture(scope="module")
+def address(reading) -> str:
+    (boundary,) = reading.get("/boundaries").json()["items"]
+    return f"/boundaries/{boundary['study_key']}"
+
+
+def test_a_boundary_is_the_stored_one_and_a_line(reading, address, filled_store):
+    with Store.existing(filled_store) as store:
+        (stored,) = store.boundaries()
+    document = reading.get(address).json()
+    line = document.pop("fit")
+    assert Boundary.model_validate(document) == stored
+    # The least-squares line through four points of a parabola.
+    for rate in SWEEP:
+        assert line["intercept"] + line["slope"] * rate == pytest.approx(critical(rate), rel=0.05)
+    assert line["slope"] == pytest.approx(0.5 + 0.05 * 1.71, rel=0.05)
+
+
+def test_boundaries_are_filtered_and_paged(tmp_path):
+    boundary = made_up_boundary()
+    keys = [f"{number:016x}" for number in range(5)]
+    with Store.open(tmp_path / "store") as store, client_of(store.path) as client:
+        for key in reversed(keys):
+            store.save_boundary(boundary.model_copy(update={"study_key": key, "name": f"study {key[-1]}"}))
+        page = client.get("/boundaries", params={"limit": 2}).json()
+        listed = [found["study_key"] for found in page["items"]]
+        while page["next"]:
+            page = client.get(page["next"]).json()
+            listed += [found["study_key"] for found in page["items"]]
+        assert listed == keys
+        (third,) = client.get("/boundaries", params={"where": "name=study 3"}).json()["items"]
+        assert third["study_key"] == keys[3]
+
+
+def test_a_boundary_that_has_changed_is_sent_again(tmp_path):
+    boundary = made_up_boundary()
+    with Store.open(tmp_path / "store") as store, client_of(store.path) as client:
+        store.save_boundary(boundary)
+        first = client.get(f"/boundaries/{boundary.study_key}")
+        tag = {"If-None-Match": first.headers["etag"]}
+        assert client.get(f"/boundaries/{boundary.study_key}", headers=tag).status_code == 304
+        grown = made_up_boundary().model_copy(update={"points": boundary.points[:2]})
+        store.save_boundary(grown)
+        second = client.get(f"/boundaries/{boundary.study_key}", headers=tag)
+        assert len(second.json()["points"]) == 2
+        assert second.json()["fit"] is None, "two points lie on a line whatever the physics"
+
+
+@pytest.mark.parametrize("rate", SWEEP)
+def test_at_a_point_it_is_that_point(reading, address, rate):
+    answer = reading.get(f"{address}/at", params={"flow.rate": rate}).json()
+    low, high = critical(rate) / 1.005, critical(rate) * 1.005
+    assert answer["critical_value"] == pytest.approx(critical(rate), rel=1e-12)
+    assert answer["uncertainty"] == pytest.approx([low, high], rel=1e-12)
+    assert answer["points"] == [{"flow.rate": rate}]
+
+
+@pytest.mark.parametrize("rate", [0.3, 0.4, 0.6, 0.75, 0.99, 1.2, 1.45])
+def test_between_points_the_uncertainty_holds_the_truth(reading, address, rate):
+    answer = reading.get(f"{address}/at", params={"flow.rate": rate}).json()
+    low, high = answer["uncertainty"]
+    assert low < critical(rate) < high
+    assert low < answer["critical_value"] < high
+    assert answer["method"] == "interpolated"
+    assert answer["parameters"] == {"flow.rate": rate}
+    (left,), (right,) = (point.values() for point in answer["points"])
+    assert left < rate < right
+    # Not by being vague: brackets of one percent, and a parabola that is known from the points.
+    bend = 0.05 * (rate - left) * (right - rate)
+    width = (1.005 - 1 / 1.005) * answer["critical_value"]
+    assert high - low == pytest.approx(width + 2 * bend, rel=1e-9)
+
+
+def test_the_nearest_point_says_where_it_is(reading, address):
+    answer = reading.get(f"{address}/at", params={"flow.rate": 7.0, "method": "nearest"}).json()
+    assert answer["parameters"] == {"flow.rate": 1.5}
+    assert answer["method"] == "nearest"
+    assert answer["critical_value"] == pytest.approx(critical(1.5), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("query", "named"),
+    [
+        ({"flow.rate": 7.0}, "within [0.25, 1.5]"),
+        ({"flow.rate": 0.1}, "within [0.25, 1.5]"),
+        ({"flow.rate": "nan"}, "flow.rate"),
+        ({"flow.rate": "1e999"}, "flow.rate"),
+        ({"flow.rate": "a lot"}, "flow.rate"),
+        ({}, "flow.rate"),
+        ({"adhesion.distance": 0.4}, "flow.rate"),
+        ({"flow.rate": 0.5, "adhesion.distance": 0.4}, "flow.rate"),
+        ({"flow.rate": 0.5, "method": "guess"}, "method"),
+    ],
+)
+def test_what_cannot_be_read_off_is_refused(reading, address, query, named):
+    response = reading.get(f"{address}/at", params=query)
+    assert response.status_code == 422
+    assert named in response.json()["detail"]
+
+
+def test_an_unknown_boundary_is_not_found(reading):
+    for address in ("/boundaries/0000000000000000", "/boundaries/0000000000000000/at?flow.rate=1"):
+        assert reading.get(address).status_code == 404
+
+
+def test_a_boundary_without_a_converged_point_has_no_value(tmp_path):
+    boundary = made_up_boundary()
+    with Store.open(tmp_path / "store") as store, client_of(store.path) as client:
+        store.save_boundary(boundary.model_copy(update={"points": boundary.points[-1:]}))
+        response = client.get(f"/boundaries/{boundary.study_key}/at", params={"flow.rate": 1})
+        assert response.status_code == 422
+        assert "converged" in response.json()["detail"]

@@ -1,0 +1,203 @@
+"""Runs over HTTP: the same ones that the store has."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import httpx
+import numpy as np
+import pytest
+
+from ensemble.store import Store
+from solver.analysis.run import Outcome
+from solver.membrane.curve import positions
+from tests.api.servers import client_of
+from tests.api.stores import FRAMES, RATES
+from tests.ensemble.runs import shear_run, shear_scene
+
+OCTETS = {"Accept": "application/octet-stream"}
+
+
+@pytest.fixture
+def bound_run(filled_store: Path, reading: httpx.Client) -> str:
+    """Key of a run in which every quantity is present."""
+    with Store.existing(filled_store) as store:
+        return store.summaries(["flow.rate=0.75"])[0].key
+
+
+def found(client: httpx.Client, **query: object) -> list[dict]:
+    response = client.get("/runs", params=query)
+    assert response.status_code == 200, response.text
+    return response.json()["items"]
+
+
+def test_runs_are_listed_newest_first(reading, filled_store):
+    with Store.existing(filled_store) as store:
+        expected = [summary.document() for summary in store.summaries()]
+    assert found(reading) == expected[::-1]
+
+
+def test_filters_name_fields_of_the_scene_and_results(reading):
+    rates = [
+        run["scene"]["flow"]["rate"] for run in found(reading, where=["flow.rate>=0.75", "outcome=bound"])
+    ]
+    assert rates == [1.0, 0.875, 0.75]
+    (failed,) = found(reading, where="outcome=failed")
+    assert failed["scene"]["flow"] is None
+
+
+@pytest.mark.parametrize("limit", [1, 2, 4, 5, 6, 100])
+def test_pages_joined_are_the_whole_list(reading, limit):
+    where = "flow.rate>0"
+    whole = found(reading, where=where)
+    assert len(whole) == len(RATES)
+    pages, address = (
+        [],
+        str(reading.build_request("GET", "/runs", params={"where": where, "limit": limit}).url),
+    )
+    while address:
+        page = reading.get(address).json()
+        assert len(page["items"]) <= limit
+        pages += page["items"]
+        address = page["next"]
+    assert pages == whole
+
+
+def test_pages_do_not_shift_when_runs_arrive_between_them(tmp_path):
+    with Store.open(tmp_path / "store") as store, client_of(store.path) as client:
+        earlier = [store.save(shear_run(shear_scene(rate=rate), seed=1)) for rate in (1.0, 2.0, 3.0)]
+        page = client.get("/runs", params={"limit": 2}).json()
+        store.save(shear_run(shear_scene(rate=4.0), seed=2))
+        rest = client.get(page["next"]).json()
+        assert [run["key"] for run in page["items"] + rest["items"]] == earlier[::-1]
+        assert rest["next"] is None
+        assert client.get("/runs").json()["items"][0]["scene"]["flow"]["rate"] == 4.0
+
+
+@pytest.mark.parametrize(
+    ("query", "named"),
+    [
+        ({"where": "no_such_field=1"}, "no_such_field"),
+        ({"where": "flow.rate"}, "path op value"),
+        ({"where": "outcome=lost"}, "outcome"),
+        ({"limit": 0}, "limit"),
+        ({"limit": 1001}, "limit"),
+        ({"after": "0" * 32}, "after"),
+    ],
+)
+def test_bad_queries_are_refused_and_named(reading, query, named):
+    response = reading.get("/runs", params=query)
+    assert response.status_code == 422
+    assert response.headers["content-type"] == "application/problem+json"
+    assert named in response.json()["detail"]
+
+
+def test_a_run_is_its_summary(reading, filled_store, bound_run):
+    with Store.existing(filled_store) as store:
+        assert reading.get(f"/runs/{bound_run}").json() == store.summary(bound_run).document()
+
+
+def test_series_are_those_of_the_run(reading, filled_store, bound_run):
+    with Store.existing(filled_store) as store:
+        run = store.load(bound_run)
+    series = reading.get(f"/runs/{bound_run}/series").json()["series"]
+    assert series == {name: values.tolist() for name, values in run.series.items()}
+    chosen = reading.get(f"/runs/{bound_run}/series", params={"name": ["time", "gap"]}).json()["series"]
+    assert chosen == {name: series[name] for name in ("gap", "time")}
+    refused = reading.get(f"/runs/{bound_run}/series", params={"name": "weight"})
+    assert refused.status_code == 422
+    assert "weight" in refused.json()["detail"]
+
+
+def test_frames_as_json_are_points_in_the_plane(reading, filled_store, bound_run):
+    with Store.existing(filled_store) as store:
+        run = store.load(bound_run)
+    frames = reading.get(f"/runs/{bound_run}/frames").json()
+    expected = positions(run.frames.tangent_angle, run.frames.center, 2 * np.pi)
+    assert frames["total"] == FRAMES
+    assert frames["index"] == list(range(FRAMES))
+    assert np.array_equal(frames["time"], run.frames.time)
+    assert np.array_equal(frames["position"], expected)
+    assert np.array_equal(frames["tension"], run.frames.tension)
+
+
+@pytest.mark.parametrize(
+    ("query", "expected"),
+    [
+        ({}, range(FRAMES)),
+        ({"stride": 3}, range(0, FRAMES, 3)),
+        ({"start": 2, "stop": 7, "stride": 2}, range(2, 7, 2)),
+        ({"start": FRAMES}, range(0)),
+        ({"start": 8, "stop": 10**9}, range(8, FRAMES)),
+    ],
+)
+def test_octets_hold_the_same_frames(reading, bound_run, query, expected):
+    document = reading.get(f"/runs/{bound_run}/frames", params=query).json()
+    assert document["index"] == list(expected)
+    octets = reading.get(f"/runs/{bound_run}/frames", params=query, headers=OCTETS)
+    assert octets.headers["content-type"] == "application/octet-stream"
+    frames = np.frombuffer(octets.content, dtype="<f4").reshape(len(expected), 1 + 2 * 3 * 32)
+    membranes = frames[:, 1:].reshape(-1, 2, 3, 32)
+    assert np.array_equal(frames[:, 0], np.float32(document["time"]))
+    if len(expected):
+        assert np.array_equal(membranes[:, :, :2], np.float32(document["position"]))
+        assert np.array_equal(membranes[:, :, 2], np.float32(document["tension"]))
+
+
+def test_what_is_not_finite_is_null_in_json(reading):
+    (failed,) = found(reading, where="outcome=failed")
+    assert failed["error"]["area"] == "NaN"
+    frames = reading.get(f"/runs/{failed['key']}/frames").json()
+    assert set(frames["tension"][0][0]) == {None}
+
+
+def test_too_many_frames_at_once_are_refused_with_the_number(filled_store, bound_run):
+    values_each = 1 + 2 * 3 * 32
+    with client_of(filled_store, frame_values=4 * values_each) as client:
+        refused = client.get(f"/runs/{bound_run}/frames")
+        assert refused.status_code == 422
+        assert "at most 4" in refused.json()["detail"]
+        assert client.get(f"/runs/{bound_run}/frames", params={"stride": 3}).json()["index"] == [0, 3, 6, 9]
+
+
+@pytest.mark.parametrize("part", ["", "/series", "/frames"])
+def test_what_never_changes_is_sent_once(reading, bound_run, part):
+    first = reading.get(f"/runs/{bound_run}{part}")
+    assert "immutable" in first.headers["cache-control"]
+    again = reading.get(f"/runs/{bound_run}{part}", headers={"If-None-Match": first.headers["etag"]})
+    assert (again.status_code, again.content) == (304, b"")
+    assert again.headers["etag"] == first.headers["etag"]
+    other = reading.get(f"/runs/{bound_run}{part}", headers={"If-None-Match": '"another"'})
+    assert other.content == first.content
+
+
+def test_tags_of_different_frames_differ(reading, bound_run):
+    address = f"/runs/{bound_run}/frames"
+    answers = [
+        reading.get(address),
+        reading.get(address, headers=OCTETS),
+        reading.get(address, params={"stride": 2}),
+        reading.get(address, params={"start": 2}),
+    ]
+    assert len({answer.headers["etag"] for answer in answers}) == len(answers)
+
+
+@pytest.mark.parametrize("part", ["", "/series", "/frames"])
+def test_an_unknown_run_is_not_found(reading, part):
+    response = reading.get(f"/runs/{'0' * 32}{part}")
+    assert response.status_code == 404
+    assert response.json()["title"] == "Not Found"
+
+
+def test_a_run_appears_as_soon_as_another_process_has_saved_it(ensemble, tmp_path):
+    Store.open(tmp_path / "store").close()
+    with client_of(tmp_path / "store") as client:
+        assert found(client) == []
+        arguments = [
+            "--set=numerics.points=32",
+            "--set=numerics.tolerance=1e-3",
+            f"--store={tmp_path / 'store'}",
+        ]
+        assert ensemble("run", "doublet-shear", *arguments).returncode == 0
+        (run,) = found(client)
+        assert run["outcome"] == Outcome.BOUND

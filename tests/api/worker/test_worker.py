@@ -1,0 +1,241 @@
+"""Jobs carried out by real workers on real ranks, stopped and killed."""
+
+from __future__ import annotations
+
+import json
+import random
+import signal
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import psutil
+import pytest
+
+from api.database.service_database import Database
+from api.jobs.job import Job, Kind, Status, Work, preset_work
+from api.jobs.job_queue import Jobs
+from api.settings import Settings
+from api.worker.background import NICENESS
+from api.worker.worker import MAXIMUM_ATTEMPTS, Verdict, verdict
+from ensemble.store import Store
+from tests.api.accepting import accepted
+from tests.api.processes import Family, alive, wait_until, working
+
+SECONDS = 100.0
+SECONDS_TO_DISMISS = 3
+SECONDS_TO_DIE = 5
+
+COARSE = {"numerics.points": 32, "numerics.tolerance": 1e-3}
+QUICK_SCENE = preset_work("doublet-shear", COARSE | {"criteria.revolutions": 1})
+LONG_SCENE = preset_work("doublet-shear", {"numerics.points": 256, "numerics.tolerance": 1e-9})
+FAILING_SCENE = preset_work("doublet-shear", COARSE | {"numerics.work_limit": 20})
+COARSE_STUDY = {f"scene.{path}": value for path, value in COARSE.items()}
+STUDY = preset_work("critical-hamaker", COARSE_STUDY | {"search.tolerance": 0.2, "sweep.values": [0.5, 1.0]})
+UNBRACKETED_STUDY = preset_work(
+    "critical-hamaker",
+    COARSE_STUDY
+    | {
+        "sweep.values": [0.5],
+        "search.limits": [1.5, 2.5],
+        "search.guesses": [{"at": 0.5, "bracket": [1.6, 2.4]}],
+        "search.tolerance": 0.3,
+    },
+)
+
+
+@pytest.fixture
+def jobs(store: Path) -> Iterator[Jobs]:
+    """The queue of a store, in the database that its workers use."""
+    with Database.open(Settings(store=store).database_url, store) as database:
+        yield Jobs(database, store)
+
+
+def submit(jobs: Jobs, work: Work, ranks: int = 1, seconds: float = SECONDS) -> Job:
+    return accepted(jobs, work, "ada", ranks, seconds).job
+
+
+def finished(jobs: Jobs, job: Job) -> Callable[[], bool]:
+    return lambda: jobs.get(job.id).status.finished
+
+
+def made(store: Path) -> dict[str, str]:
+    """Time of creation of every committed run."""
+    with Store.existing(store) as opened:
+        return {summary.key: summary.created.isoformat() for summary in opened.summaries()}
+
+
+def simulating(family: Family, ranks: int) -> Callable[[], bool]:
+    def all_there() -> bool:
+        found = [process.environ().get("PMI_RANK") for process in family.descendants()]
+        return {str(number) for number in range(ranks)} <= set(found)
+
+    return all_there
+
+
+def test_jobs_are_carried_out_one_after_the_other(jobs, store):
+    scene, failing = submit(jobs, QUICK_SCENE), submit(jobs, FAILING_SCENE)
+    study, unbracketed = submit(jobs, STUDY, ranks=2), submit(jobs, UNBRACKETED_STUDY)
+    progress: dict[str, set[int]] = {job.id: set() for job in (scene, study)}
+    with working(store):
+
+        def all_finished() -> bool:
+            for name in progress:
+                progress[name].add(jobs.get(name).progress)
+            return all(jobs.get(job.id).status.finished for job in (scene, failing, study, unbracketed))
+
+        wait_until(all_finished)
+    with Store.existing(store) as opened:
+        scene_done, study_done = jobs.get(scene.id), jobs.get(study.id)
+        assert (scene_done.status, scene_done.message) == (Status.SUCCEEDED, "bound")
+        assert opened.outcome(scene.key) == "bound"
+        assert (study_done.status, study_done.message) == (Status.SUCCEEDED, "2 of 2 points converged")
+        (boundary,) = [found for found in opened.boundaries() if found.study_key == study.key]
+        assert {point.status for point in boundary.points} == {"converged"}
+        assert jobs.get(failing.id).status is Status.FAILED
+        assert jobs.get(failing.id).message == opened.summary(failing.key).failure
+        assert jobs.get(unbracketed.id).status is Status.FAILED
+        assert jobs.get(unbracketed.id).message == "0 of 1 points converged; flow.rate 0.5: unbracketed"
+        assert opened.check() == []
+    for done in (scene_done, study_done):
+        assert done.created < done.started < done.finished
+        assert (done.progress, done.attempts) == (100, 1)
+    assert any(0 < seen < 100 for seen in progress[study.id])
+    assert "runs" in jobs.log_path(study).read_text()
+    assert "100%" in jobs.log_path(study).read_text()
+    assert "time" in jobs.log_path(scene).read_text()
+
+
+def test_what_is_in_the_store_is_not_run_again(jobs, store):
+    with working(store):
+        first = submit(jobs, QUICK_SCENE)
+        wait_until(finished(jobs, first))
+        before = made(store)
+        again = submit(jobs, QUICK_SCENE)
+        wait_until(finished(jobs, again))
+    assert jobs.get(again.id).status is Status.SUCCEEDED
+    assert made(store) == before
+    assert before.keys() == {first.key}
+
+
+def test_a_job_ends_at_its_time_limit(jobs, store):
+    job = submit(jobs, LONG_SCENE, seconds=1.0)
+    with working(store) as family:
+        wait_until(finished(jobs, job))
+        wait_until(lambda: not family.descendants(), SECONDS_TO_DISMISS)
+    assert jobs.get(job.id).status is Status.FAILED
+    assert jobs.get(job.id).message == "stopped at its time limit, 1 s"
+
+
+def gives_way(process: psutil.Process) -> bool:
+    weight = Path(f"/proc/{process.pid}/autogroup")  # of its session, where the kernel has such weights
+    session_does = not weight.exists() or weight.read_text().split()[-1] == str(NICENESS)
+    return process.nice() == NICENESS and session_does
+
+
+def test_a_dismissed_job_leaves_no_process_and_makes_room(jobs, store):
+    job, following = submit(jobs, LONG_SCENE, ranks=2), submit(jobs, QUICK_SCENE)
+    with working(store) as family:
+        wait_until(simulating(family, 1))
+        wait_until(lambda: gives_way(family.rank(0)))
+        job_processes = family.descendants()
+        assert jobs.dismiss(job.id).status is Status.DISMISSED
+        wait_until(lambda: not alive(job_processes), SECONDS_TO_DISMISS)
+        wait_until(finished(jobs, following))
+    assert jobs.get(job.id).status is Status.DISMISSED
+    assert made(store).keys() == {following.key}
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_stopped_worker_gives_its_job_back(jobs, store, number):
+    job = submit(jobs, LONG_SCENE)
+    with working(store) as family:
+        wait_until(simulating(family, 1))
+        family.worker.send_signal(number)
+        assert family.worker.wait(SECONDS_TO_DISMISS) == 0
+        assert family.members() == []
+    assert jobs.get(job.id).status is Status.ACCEPTED
+    assert jobs.lease("another") is not None, "without waiting for the lease to run out"
+
+
+def test_a_worker_ends_with_its_input_if_asked(jobs, store):
+    job = submit(jobs, LONG_SCENE)
+    with working(store, "--end-with-input") as family:
+        wait_until(simulating(family, 1))
+        family.worker.stdin.close()
+        assert family.worker.wait(SECONDS_TO_DISMISS) == 0
+        assert family.members() == []
+    assert jobs.get(job.id).status is Status.ACCEPTED
+
+
+VICTIMS: dict[str, Callable[[Family], psutil.Process]] = {
+    "worker": lambda family: psutil.Process(family.worker.pid),
+    "watcher": Family.watcher,
+    "launcher": Family.launcher,
+    "helper": Family.helper,
+    "rank 1": lambda family: family.rank(1),
+}
+
+
+@pytest.mark.parametrize("victim", VICTIMS)
+def test_a_kill_leaves_no_process_loses_no_job_and_repeats_no_run(jobs, store, victim):
+    job = submit(jobs, STUDY, ranks=2)
+    with working(store) as family:
+        wait_until(lambda: len(made(store)) >= 2)
+        time.sleep(random.Random(victim).uniform(0, 0.5))
+        attempt = family.descendants()
+        kept = made(store)
+        VICTIMS[victim](family).send_signal(signal.SIGKILL)
+        wait_until(lambda: not alive(attempt), SECONDS_TO_DIE)
+        if victim == "worker":
+            assert family.descendants() == []
+            assert not jobs.get(job.id).status.finished
+            with working(store):
+                wait_until(lambda: jobs.get(job.id).attempts == 2)
+                wait_until(finished(jobs, job))
+        else:
+            wait_until(finished(jobs, job))
+    done = jobs.get(job.id)
+    assert (done.status, done.message) == (Status.SUCCEEDED, "2 of 2 points converged")
+    assert done.attempts == 2
+    assert kept.items() <= made(store).items(), "a committed run was made again"
+    with Store.existing(store) as opened:
+        assert opened.check() == []
+
+
+def test_a_job_that_is_always_cut_short_is_given_up(jobs, store):
+    job = submit(jobs, QUICK_SCENE)
+    for _ in range(MAXIMUM_ATTEMPTS):
+        lease = jobs.lease("unlucky")
+        assert lease is not None
+        jobs.give_back(lease, "cut short")
+    with working(store):
+        wait_until(finished(jobs, job))
+    assert jobs.get(job.id).status is Status.FAILED
+    assert str(MAXIMUM_ATTEMPTS) in jobs.get(job.id).message
+    assert not jobs.log_path(job).exists()
+
+
+@pytest.mark.parametrize(
+    ("kind", "status", "output", "last_words", "expected"),
+    [
+        (Kind.SCENE, 2, "", "ensemble: flow.rate: no", Verdict(Status.FAILED, "ensemble: flow.rate: no")),
+        (Kind.SCENE, 1, "", "", Verdict(Status.FAILED, "ended with status 1")),
+        (
+            Kind.SCENE,
+            1,
+            json.dumps({"outcome": "failed", "failure": "underflow"}),
+            "warning",
+            Verdict(Status.FAILED, "underflow"),
+        ),
+        (
+            Kind.SCENE,
+            0,
+            json.dumps({"outcome": "separated", "failure": None}),
+            "",
+            Verdict(Status.SUCCEEDED, "separated"),
+        ),
+    ],
+)
+def test_how_a_job_has_ended(kind, status, output, last_words, expected):
+    assert verdict(kind, status, output, last_words) == expected

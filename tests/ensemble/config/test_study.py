@@ -1,0 +1,309 @@
+"""Presets are what the paper computed, studies refuse what cannot work, guesses follow the known boundary."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.optimize import brentq
+from scipy.special import ellipe
+
+from ensemble.config.study import Study, load_scene, load_study, preset_names
+from ensemble.search.critical_value import Side, Status
+from ensemble.search.grid import GeometricGrid
+from solver.analysis.run import Outcome
+from solver.scene import Adhesion, Scene, Shear, Trap
+
+DOUBLET_STUDIES = (
+    "critical-extension-hamaker",
+    "critical-extension-rate",
+    "critical-hamaker-contrast",
+    "critical-hamaker-reduced-area",
+    "critical-hamaker-short-range",
+    "critical-hamaker",
+    "critical-separation-rate",
+)
+STUDIES = (*DOUBLET_STUDIES, "critical-viscosity-contrast")
+PUBLISHED = (
+    "doublet-draining",
+    "doublet-equilibrium",
+    "doublet-quiescent",
+    "doublet-shear",
+    "doublet-trap",
+    "pair-extension",
+    "vesicle-shear",
+)
+MANY = ("cluster-quiescent", "suspension-shear")
+SCENES = (*PUBLISHED, *MANY, "doublet-unequal")
+
+HAMAKER = load_study("critical-hamaker")
+GRID = GeometricGrid(HAMAKER.search.tolerance)
+
+
+def ellipse_half_width(reduced_area: float, length: float) -> float:
+    """Short semiaxis of the ellipse of this reduced area and length, from its perimeter 4aE(1 − b²/a²)."""
+
+    def excess(ratio: float) -> float:
+        return math.pi**2 * ratio / (4 * ellipe(1 - ratio**2) ** 2) - reduced_area
+
+    ratio = brentq(excess, 1e-3, 1.0)
+    return float(ratio * length / (4 * ellipe(1 - ratio**2)))
+
+
+def test_all_presets_ship() -> None:
+    assert preset_names() == tuple(sorted(STUDIES + SCENES))
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_a_study_is_called_as_its_preset(name: str) -> None:
+    assert load_study(name).name == name
+
+
+@pytest.mark.parametrize("name", preset_names())
+def test_every_preset_says_what_it_is_and_where_it_comes_from(name: str) -> None:
+    text = (
+        Path(__file__).parents[2].joinpath("ensemble", "presets", f"{name}.toml").read_text(encoding="utf-8")
+    )
+    comment = [line for line in text.split("\n\n")[0].splitlines() if line.startswith("# ")]
+    sources = ("Quaife, Veerapaneni and Young", "Keller and Skalak")
+    assert any(source in line for line in comment for source in sources)
+
+
+def test_no_doublet_starts_in_contact() -> None:
+    scenes = [load_scene(name) for name in PUBLISHED]
+    for study in map(load_study, DOUBLET_STUDIES):
+        scenes += [study.scene_at(sweep_value, study.search.limits[0]) for sweep_value in study.sweep.values]
+    doublets = [scene.vesicles for scene in scenes if len(scene.vesicles) == 2]
+    assert len(doublets) == len(scenes) - 1
+    for left, right in doublets:
+        assert left.angle == right.angle == math.pi / 2
+        widths = sum(ellipse_half_width(vesicle.reduced_area, vesicle.length) for vesicle in (left, right))
+        assert right.center[0] - left.center[0] - widths > 0.4
+
+
+def test_parameters_of_the_published_scenes() -> None:
+    shear = load_scene("doublet-shear")
+    assert [vesicle.center for vesicle in shear.vesicles] == [(-1.5, 0.0), (1.5, 0.0)]
+    assert {vesicle.reduced_area for vesicle in shear.vesicles} == {0.9}
+    assert shear.adhesion == Adhesion(hamaker=1.5, distance=0.4)
+    assert shear.flow == Shear(rate=0.5)
+    trap = load_scene("doublet-trap")
+    assert {vesicle.reduced_area for vesicle in trap.vesicles} == {0.8}
+    assert trap.adhesion == Adhesion(hamaker=0.7, distance=0.4)
+    assert trap.flow == Trap(rate=0.09)
+    assert trap.start.relaxed
+    assert trap.start.tilt == 1e-3
+    assert load_scene("doublet-quiescent").flow is None
+    single = load_scene("vesicle-shear")
+    assert len(single.vesicles) == 1
+    assert single.adhesion is None
+
+
+@pytest.mark.parametrize("name", MANY)
+def test_tens_of_vesicles_begin_within_reach_of_adhesion_but_apart(name: str) -> None:
+    scene = load_scene(name)
+    assert len(scene.vesicles) == 24
+    assert scene == load_scene(name)
+    assert scene.vesicles != load_scene(name, ["arrangement.seed=2"]).vesicles
+    pair = load_scene("doublet-shear")
+    assert scene.adhesion == pair.adhesion
+    assert scene.flow in (None, pair.flow)
+
+
+def test_scene_at_sets_both_parameters_and_nothing_else() -> None:
+    scene = HAMAKER.scene_at(1.25, 0.8)
+    assert scene.flow == Shear(rate=1.25)
+    assert scene.adhesion == Adhesion(hamaker=0.8, distance=0.4)
+    restored = scene.model_copy(update={"flow": HAMAKER.scene.flow, "adhesion": HAMAKER.scene.adhesion})
+    assert restored == HAMAKER.scene
+    trap = load_study("critical-extension-rate").scene_at(0.65, 0.1)
+    assert [vesicle.reduced_area for vesicle in trap.vesicles] == [0.65, 0.65]
+
+
+def test_sides_of_outcomes() -> None:
+    assert {outcome: HAMAKER.side(outcome) for outcome in Outcome} == {
+        Outcome.BOUND: Side.HIGH,
+        Outcome.SEPARATED: Side.LOW,
+        Outcome.FAILED: Side.FAILED,
+        Outcome.UNDECIDED: Side.UNDECIDED,
+        Outcome.END_TO_END: Side.UNDECIDED,
+        Outcome.EQUILIBRIUM: Side.UNDECIDED,
+        Outcome.STEADY: Side.UNDECIDED,
+        Outcome.TUMBLING: Side.UNDECIDED,
+    }
+    trap = load_study("critical-extension-rate")
+    assert trap.side(Outcome.BOUND) is Side.LOW
+    assert trap.side(Outcome.END_TO_END) is trap.side(Outcome.SEPARATED) is Side.HIGH
+
+
+def test_a_whole_study_on_a_known_boundary_takes_few_runs() -> None:
+    known: dict[float, tuple[float, float]] = {}
+    runs = []
+    for rate in HAMAKER.sweep.values:
+        critical = 0.10 + 0.571 * rate  # the published fit
+        search = HAMAKER.critical_value(HAMAKER.guess_at(rate, known))
+        asked = 0
+        while (value := search.ask()) is not None:
+            search.tell(value, Side.LOW if value < critical else Side.HIGH)
+            asked += 1
+        assert search.status is Status.CONVERGED
+        low, high = search.bracket
+        assert low is not None
+        assert high is not None
+        assert low < critical <= high
+        known[rate] = (low, high)
+        runs.append(asked)
+    unguided = math.log2(len(GRID.within(*HAMAKER.search.limits)))
+    assert sum(runs) <= 0.75 * len(runs) * unguided
+    assert max(runs[2:]) <= 6
+
+
+def test_a_guess_without_neighbors_is_the_study_s_own() -> None:
+    assert HAMAKER.guess_at(0.25, {}) == (0.2, 0.3)
+    low, high = HAMAKER.guess_at(0.75, {}) or (0.0, 0.0)  # between those at 0.5 and 1.0
+    assert 0.3 < low < 0.5 < high < 0.7
+
+
+def test_a_known_point_replaces_the_guess_there() -> None:
+    assert HAMAKER.guess_at(0.5, {0.5: (0.36, 0.37)}) == (0.36, 0.37)
+    low, high = HAMAKER.guess_at(0.75, {0.5: (1.0, 1.0)}) or (0.0, 0.0)
+    assert low < math.sqrt(0.6 * 0.7) / 2 + 1 / 2 < high
+
+
+def test_a_guess_from_one_neighbor_covers_a_constant_and_a_proportional_boundary() -> None:
+    alone = load_study("critical-hamaker", ["search.guesses=[]"])
+    assert alone.guess_at(0.5, {}) is None
+    low, high = alone.guess_at(0.5, {0.25: (0.24, 0.24)}) or (0.0, 0.0)
+    assert low == pytest.approx(0.12)
+    assert high == pytest.approx(0.48)
+
+
+@given(
+    slope=st.floats(-0.3, 3.0),
+    offset=st.floats(0.8, 2.0),
+    at=st.floats(0.3, 1.45),
+    known=st.sets(st.sampled_from([0.2, 0.4, 0.6, 0.8, 1.0, 1.2, 1.4, 1.6]), min_size=2),
+)
+def test_a_guess_from_neighbors_holds_a_linear_boundary(
+    slope: float, offset: float, at: float, known: set[float]
+) -> None:
+    def boundary(rate: float) -> float:
+        return offset + slope * rate
+
+    low, high = HAMAKER.guess_at(at, {rate: (boundary(rate), boundary(rate)) for rate in known}) or (0.0, 0.0)
+    limit = HAMAKER.search.limits[1]
+    assert low <= min(boundary(at), limit) <= high
+    assert high < 2 * low
+    assert HAMAKER.critical_value((low, high)).ask() is not None
+
+
+def test_neighbors_on_both_sides_are_preferred_to_nearer_ones_on_one() -> None:
+    known = {0.8: (1.0, 1.0), 0.9: (2.0, 2.0), 1.5: (2.0, 2.0)}
+    low, high = HAMAKER.guess_at(1.0, known) or (0.0, 0.0)
+    assert low < 2.0 < high < 2.1
+
+
+def test_a_guess_beyond_the_limits_is_brought_back_and_usable() -> None:
+    guess = HAMAKER.guess_at(0.25, {1.0: (0.5, 0.5), 0.75: (0.1, 0.1)})
+    assert guess is not None
+    assert guess[0] == HAMAKER.search.limits[0]
+    assert HAMAKER.critical_value(guess).ask() is not None
+
+
+def test_the_key_depends_on_the_contents_alone() -> None:
+    assert len(HAMAKER.key) == 16
+    assert int(HAMAKER.key, 16) >= 0
+    assert load_study("critical-hamaker").key == HAMAKER.key
+    assert Study.model_validate_json(HAMAKER.model_dump_json()).key == HAMAKER.key
+    keys = {
+        load_study("critical-hamaker", overrides).key
+        for overrides in (["search.tolerance=0.02"], ["scene.numerics.points=96"], ["sweep.values=[0.5]"])
+    }
+    assert len(keys | {HAMAKER.key}) == 4
+
+
+def test_the_key_is_the_same_in_another_process() -> None:
+    program = "from ensemble.config.study import load_study; print(load_study('critical-hamaker').key)"
+    other = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=120
+    )
+    assert other.stdout.strip() == HAMAKER.key
+
+
+def test_tolerance_and_overrides_reach_the_study() -> None:
+    study = load_study("critical-hamaker", ["scene.vesicles.reduced_area=0.8"], tolerance=0.05)
+    assert study.search.tolerance == 0.05
+    assert [vesicle.reduced_area for vesicle in study.scene.vesicles] == [0.8, 0.8]
+
+
+def test_files_are_read_as_presets_are(tmp_path: Path) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_text("horizon = 5.0\n[[vesicles]]\n", encoding="utf-8")
+    assert load_scene(scene, ["vesicles.0.reduced_area=0.7"]).vesicles[0].reduced_area == 0.7
+    assert load_scene(str(scene)) == Scene.model_validate({"horizon": 5.0, "vesicles": [{}]})
+
+
+def test_an_unknown_name_is_told_the_presets() -> None:
+    with pytest.raises(ValueError, match="'critical-hamker' is neither") as refused:
+        load_study("critical-hamker")
+    assert all(name in str(refused.value) for name in preset_names())
+
+
+def test_a_file_that_is_not_toml_is_named(tmp_path: Path) -> None:
+    broken = tmp_path / "broken.toml"
+    broken.write_text("horizon = = 5", encoding="utf-8")
+    with pytest.raises(ValueError, match=r"broken\.toml: "):
+        load_scene(broken)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ("search.tolerance=0.6", "search.tolerance: 0.6 — input should be less than or equal to 0.5"),
+        ("search.limits=[5.0, 0.05]", "search.limits: [5.0, 0.05] — the first must be less than the second"),
+        ("search.limits=[1.001, 1.002]", "search.limits: [1.001, 1.002] — must be further apart than"),
+        ("search.limits=[0.0, 1.0]", "search.limits.0: 0.0 — input should be greater than 0"),
+        (
+            "search.guesses=[{at = 0.5, bracket = [0.3, 0.2]}]",
+            "search.guesses.0.bracket: [0.3, 0.2] — the first must be less than the second",
+        ),
+        ("search.low=['failed']", "search.low: ['failed'] — undecided and failed are no answers"),
+        ("search.low=['bound']", "search.high: ['bound'] — must share no outcome with low"),
+        ("search.high=[]", "search.high: [] — tuple should have at least 1 item"),
+        ("search.parameter=flow.kind", "search.parameter: 'flow.kind' — must be the dotted path of a number"),
+        ("search.parameter=adhesion", "search.parameter: 'adhesion' — must be the dotted path of a number"),
+        (
+            "search.parameter=flow.speed",
+            "search.parameter: 'flow.speed' — must be the dotted path of a number",
+        ),
+        ("search.parameter=start.relaxed", "search.parameter: 'start.relaxed' — must be the dotted path"),
+        ("search.parameter=vesicles.2.angle", "search.parameter: vesicles.2: no such element, there are 2"),
+        ("search.parameter=flow.rate", "sweep.parameter: 'flow.rate' — must differ from search.parameter"),
+        ("sweep.values=[]", "sweep.values: [] — tuple should have at least 1 item"),
+        ("sweep.values=[0.5, 0.5]", "sweep.values: [0.5, 0.5] — values must be distinct"),
+        ("sweep.values=[0.5, inf]", "sweep.values.1: inf — input should be a finite number"),
+        ("sweep.values=[0.5, -1.0]", "flow.rate: -1.0 — input should be greater than or equal to 0"),
+        ("scene.vesicles.reduced_area=1.2", "scene.vesicles.0.reduced_area: 1.2 — input should be less than"),
+    ],
+)
+def test_a_study_that_cannot_work_is_refused_by_field(change: str, message: str) -> None:
+    with pytest.raises(ValueError, match=r"^critical-hamaker: ") as refused:
+        load_study("critical-hamaker", [change])
+    assert str(refused.value).removeprefix("critical-hamaker: ").startswith(message)
+
+
+def test_a_parameter_inside_the_other_is_refused() -> None:
+    with pytest.raises(ValueError, match="must differ"):
+        load_study(
+            "critical-hamaker",
+            [
+                "search.parameter=vesicles.0.reduced_area",
+                "sweep.parameter=vesicles.reduced_area",
+                "search.limits=[0.5, 0.9]",
+            ],
+        )

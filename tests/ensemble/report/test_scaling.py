@@ -1,0 +1,181 @@
+"""The scaling report: a model that is recovered from its own times, and measurements on real ranks."""
+
+from __future__ import annotations
+
+import math
+import sys
+
+import numpy as np
+import pytest
+
+from ensemble.config.study import load_scene
+from ensemble.figures import save
+from ensemble.mpi.scaling_model import LEAST_EFFICIENCY, MEASURED, ScalingModel, recommended_ranks
+from ensemble.report.scaling.counting import Counted
+from ensemble.report.scaling.model_fit import crossover, model_of, recommendations, with_fast_summation
+from ensemble.report.scaling.profile import PARTS, shares_of_time
+from ensemble.report.scaling.scaling_document import Collective, Cost, Evaluation, Scaling
+from ensemble.report.scaling.scaling_figures import scaling_figures
+from ensemble.report.scaling.scaling_plan import FULL, POINTS, QUICK, suspension
+from ensemble.report.scaling.scaling_text import scaling_text
+from solver.parallel import SERIAL
+
+KNOWN = ScalingModel(
+    pair=3e-8,
+    point=5e-6,
+    repeated=4e-6,
+    fixed=2e-4,
+    gathers=6.0,
+    bytes_a_point=16.0,
+    latency=1e-5,
+    bandwidth=1e9,
+)
+
+
+def test_one_rank_exchanges_nothing_and_is_efficient():
+    for points in (64, 10_000):
+        assert KNOWN.collectives(points, 1) == 0
+        assert KNOWN.efficiency(points, 1) == 1
+        assert KNOWN.seconds(points, 1) == pytest.approx(3e-8 * points**2 + 9e-6 * points + 2e-4)
+
+
+def test_an_evaluation_takes_at_least_what_every_rank_repeats_and_exchanges():
+    seconds = [KNOWN.seconds(4096, ranks) for ranks in (1, 2, 4, 8)]
+    assert seconds == sorted(seconds, reverse=True)
+    floor = 4e-6 * 4096 + 2e-4 + 6 * (1e-5 * 20 + 16 * 4096 / 1e9)
+    assert KNOWN.seconds(4096, 2**20) == pytest.approx(floor, rel=1e-3)
+
+
+def evaluation(vesicles: int, ranks: int, **fields: float) -> Evaluation:
+    gathered = KNOWN.gathers * KNOWN.bytes_a_point * POINTS * vesicles
+    values = {
+        "seconds": KNOWN.seconds(POINTS * vesicles, ranks),
+        "efficiency": KNOWN.efficiency(POINTS * vesicles, ranks),
+        "gathers": KNOWN.gathers,
+        "gathered_bytes": gathered,
+        "difference": 0.0,
+        **dict.fromkeys(PARTS, 0.25),
+    }
+    return Evaluation(vesicles=vesicles, ranks=ranks, **values | fields)
+
+
+COSTS = [
+    Cost(
+        vesicles=vesicles,
+        seconds=KNOWN.seconds(POINTS * vesicles, 1),
+        sums=8.0,
+        peak_memory_bytes=1,
+        with_fast_summation=None,
+    )
+    for vesicles in (8, 16, 32, 64, 128)
+]
+
+
+def test_a_model_is_recovered_from_its_own_times():
+    collectives = [
+        Collective(
+            ranks=ranks,
+            gathered_bytes=size,
+            seconds=1e-5 * math.ceil(math.log2(ranks)) + size * (ranks - 1) / ranks / 1e9,
+        )
+        for ranks in (2, 4)
+        for size in (16, 1024, 10**6)
+    ]
+    model = model_of(COSTS, [evaluation(16, 2), evaluation(64, 2)], collectives)
+    for name, value in KNOWN.model_dump().items():
+        assert getattr(model, name) == pytest.approx(value, rel=1e-6), name
+
+
+def test_the_recommendation_is_the_last_efficient_number_of_ranks():
+    for found in recommendations(KNOWN):
+        points = POINTS * found.vesicles
+        assert found.ranks == 1 or KNOWN.efficiency(points, found.ranks) >= LEAST_EFFICIENCY
+        assert found.ranks == 10_000 or KNOWN.efficiency(points, found.ranks + 1) < LEAST_EFFICIENCY
+    pair = load_scene("doublet-shear")
+    assert recommended_ranks(pair, 64) == MEASURED.recommended_ranks(64, 64)  # its image is not computed
+
+
+def test_fast_summation_pays_beyond_the_crossover():
+    found = crossover(KNOWN, COSTS, pair_seconds=2e-9)
+    assert found.pairs_a_point == pytest.approx(3 * 2 * 9 * math.sqrt(3) * found.terms)
+    assert found.point_seconds == pytest.approx(8 * 2e-9 * found.pairs_a_point)
+    for vesicles, pays in ((found.vesicles // 2, False), (2 * found.vesicles, True)):
+        assert (with_fast_summation(KNOWN, found, vesicles) < KNOWN.seconds(POINTS * vesicles, 1)) is pays
+
+
+def test_what_is_gathered_is_counted():
+    counted = Counted(SERIAL)
+    shares = counted.divide(5)
+    assert shares.own == slice(0, 5)
+    part = np.arange(10.0).reshape(5, 2)
+    np.testing.assert_array_equal(shares.gather(part), part)
+    shares.gather(part)
+    assert (counted.rank, counted.size, counted.gathers, counted.gathered_bytes) == (0, 1, 2, 160)
+    counted.reset()
+    assert (counted.gathers, counted.seconds) == (0, 0.0)
+
+
+def test_the_parts_of_an_evaluation_are_its_whole_time():
+    shares = shares_of_time(lambda: Counted(SERIAL).divide(3).gather(np.zeros((3, 2))))
+    assert shares.keys() == set(PARTS)
+    assert sum(shares.values()) == pytest.approx(1.0)
+    assert shares["collectives"] > 0
+
+
+@pytest.mark.parametrize("plan", [QUICK, FULL])
+def test_plans_reach_from_a_pair_to_many(plan):
+    assert plan.shared[0] == plan.alone[0] == 2
+    assert list(plan.alone) == sorted(plan.alone)
+    assert suspension(2).vesicles == load_scene("doublet-shear").vesicles
+    assert len(suspension(16).vesicles) == 16
+
+
+MEASURING = """
+import sys
+from pathlib import Path
+from ensemble.mpi.world import abort_guard, world
+from ensemble.report.scaling.make_scaling import measured
+from ensemble.report.scaling.scaling_plan import Plan
+communicator = world()
+with abort_guard(communicator):
+    plan = Plan(shared=(2, 8), alone=(2, 8, 12), weak=8, repeats=1)
+    document = measured(communicator, plan, lambda line: None)
+    assert (document is None) == (communicator.Get_rank() > 0)
+    if document is not None:
+        Path(sys.argv[1]).write_text(document.model_dump_json())
+"""
+
+
+def test_evaluations_are_measured_on_real_ranks_and_written(launcher, tmp_path):
+    """More ranks than the machine has cores, perhaps: then the times are those of a crowd."""
+    file = tmp_path / "scaling.json"
+    result = launcher.run(3, [sys.executable, "-c", MEASURING, str(file)])
+    assert result.returncode == 0, result.stderr
+    report = Scaling.model_validate_json(file.read_text())
+    assert [(point.vesicles, point.ranks) for point in report.evaluations] == [
+        (vesicles, ranks) for vesicles in (2, 8) for ranks in (1, 2, 3)
+    ]
+    for point in report.evaluations:
+        assert point.difference < 1e-9
+        assert point.seconds > 0
+        assert point.gathers > 0
+        assert point.kernels + point.collectives + point.solves + point.other == pytest.approx(1.0)
+        assert (point.predicted is None) == (point.vesicles == 2)
+    assert [(point.vesicles, point.ranks) for point in report.weak] == [(8, 1), (11, 2), (14, 3)]
+    assert {point.ranks for point in report.collectives} == {2, 3}
+    assert [cost.vesicles for cost in report.costs] == [2, 8, 12]
+    memory = [cost.peak_memory_bytes for cost in report.costs]
+    assert memory == sorted(memory)
+
+    figures = scaling_figures(report)
+    assert figures.keys() == {"efficiency", "parts", "cost"}
+    for name, figure in figures.items():
+        save(figure, tmp_path / f"{name}.png")
+        assert (tmp_path / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+    text = scaling_text(report, ["cost.png"])
+    assert "![cost.png](cost.png)" in text
+    assert f"{report.crossover.pairs_a_point:.0f} pairs of the direct sum" in text
+    assert report.crossover.pair_seconds > 0
+    assert all(cost.sums > 1 for cost in report.costs[1:])
+    for point in report.evaluations:
+        assert f"{point.seconds:.4g}" in text

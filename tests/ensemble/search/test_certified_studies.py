@@ -1,0 +1,274 @@
+"""Searches of a study and the certifications of their brackets, together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ensemble.cli.result_tables import boundary_cells, boundary_columns
+from ensemble.config.study import Study, load_study
+from ensemble.search.boundary import BoundaryPoint
+from ensemble.search.grid import GeometricGrid
+from ensemble.search.point_search import Trial
+from ensemble.search.study_planner import Coordinator
+from ensemble.store.run_key import run_key
+from solver.analysis.run import Outcome
+from solver.scene import Numerics, Shear
+
+GRID = GeometricGrid(0.05)
+INDICES = GRID.within(0.05, 5.0)
+
+
+@dataclass(frozen=True)
+class TwoNumerics:
+    """Outcomes that depend on the numerics: thresholds apart, and a factor of values without an answer."""
+
+    shift: float = 1.0  # finer threshold over coarse threshold
+    silence: float = 1.0  # finer runs from threshold/silence up to threshold·silence are undecided
+
+    def __call__(self, task: Trial) -> Outcome:
+        assert task.scene.adhesion is not None
+        assert isinstance(task.scene.flow, Shear)
+        critical = 0.1 + 0.571 * task.scene.flow.rate
+        ratio = task.scene.adhesion.hamaker / critical
+        if is_finer(task):
+            ratio /= self.shift
+            if 1 / self.silence < ratio < self.silence:
+                return Outcome.UNDECIDED
+        return Outcome.BOUND if ratio > 1 else Outcome.SEPARATED
+
+
+def is_finer(task: Trial) -> bool:
+    return task.scene.numerics.points == 128
+
+
+def unknown(_: str) -> None:
+    return None
+
+
+@pytest.fixture(scope="module")
+def study() -> Study:
+    return load_study("critical-hamaker", ["sweep.values=[0.25, 0.75, 1.5]"], 0.05, certify=True)
+
+
+def trace(
+    coordinator: Coordinator,
+    answer: Callable[[Trial], Outcome],
+    workers: int = 1,
+    choose: Callable[[int], int] = lambda out: 0,
+) -> list[Trial]:
+    """Keep workers busy, finishing at each turn the task that `choose` picks among those out."""
+    out: list[Trial] = []
+    made: list[Trial] = []
+    while not coordinator.done:
+        while len(out) < workers and (task := coordinator.next_task()) is not None:
+            out.append(task)
+        if not out:
+            assert coordinator.done, "known answers were all that it needed"
+            break
+        made.append(out.pop(choose(len(out))))
+        coordinator.answer(made[-1], answer(made[-1]))
+        for pointless in coordinator.pointless_tasks():
+            out.remove(pointless)
+            coordinator.cancelled(pointless)
+    assert not out
+    assert coordinator.next_task() is None
+    return made
+
+
+def answers(points: list[BoundaryPoint]) -> list[dict[str, Any]]:
+    """Points without their runs: workers may try more values than are needed."""
+    return [point.model_dump(exclude={"runs"}) for point in points]
+
+
+numerics_apart = st.builds(
+    TwoNumerics, shift=st.floats(0.7, 1.4), silence=st.sampled_from([1.0, 1.0, 1.02, 1.2])
+)
+
+
+@settings(deadline=None, max_examples=20)
+@given(physics=numerics_apart, workers=st.integers(1, 9), data=st.data())
+def test_certified_points_depend_neither_on_the_workers_nor_on_the_order_of_answers(
+    study: Study, physics: TwoNumerics, workers: int, data: st.DataObject
+) -> None:
+    alone, together = Coordinator(study, unknown), Coordinator(study, unknown)
+    trace(alone, physics)
+    made = trace(together, physics, workers, lambda out: data.draw(st.integers(0, out - 1)))
+    assert answers(together.boundary().points) == answers(alone.boundary().points)
+    assert len({task.key for task in made}) == len(made)
+    for point in together.boundary().points:
+        low, high = point.bracket
+        critical = 0.1 + 0.571 * point.parameters["flow.rate"]
+        assert low is not None
+        assert high is not None
+        assert low <= min(critical, critical * physics.shift)
+        assert max(critical, critical * physics.shift) < high
+        assert point.outcomes == ("separated", "bound")
+        assert (point.status, point.certified) == ("converged", True)
+        assert point.certified_by == Numerics(points=128, tolerance=1e-5)
+        finer_keys = {task.key for task in made if is_finer(task)}
+        assert len(finer_keys.intersection(point.runs)) >= 2
+
+
+@settings(deadline=None, max_examples=15)
+@given(physics=numerics_apart, kept=st.sets(st.integers(0, 60)))
+def test_what_is_known_is_never_run_again_and_changes_nothing(
+    study: Study, physics: TwoNumerics, kept: set[int]
+) -> None:
+    first = Coordinator(study, unknown)
+    made = trace(first, physics, 3, lambda out: out - 1)
+    known = {task.key: physics(task) for index, task in enumerate(made) if index in kept}
+    resumed = Coordinator(study, known.get, [task.scene for task in made])
+    again = trace(resumed, physics, 2)
+    assert answers(resumed.boundary().points) == answers(first.boundary().points)
+    assert not {task.key for task in again} & known.keys()
+    assert resumed.known_answers == len(known)
+
+
+def test_asked_for_later_a_certification_adds_only_its_own_runs(study: Study) -> None:
+    physics = TwoNumerics(shift=1.2)
+    plain = Coordinator(load_study("critical-hamaker", ["sweep.values=[0.25, 0.75, 1.5]"], 0.05), unknown)
+    searched = trace(plain, physics)
+    assert not any(is_finer(task) for task in searched)
+    assert {(point.certified, point.certified_by) for point in plain.boundary().points} == {(False, None)}
+
+    known = {task.key: physics(task) for task in searched}
+    certified = Coordinator(study, known.get, [task.scene for task in searched])
+    added = trace(certified, physics, 2)
+    assert added
+    assert all(is_finer(task) for task in added)
+
+    known |= {task.key: physics(task) for task in added}
+    again = Coordinator(study, known.get, [task.scene for task in (*searched, *added)])
+    assert again.done
+    assert again.next_task() is None
+    assert again.known_answers == len(searched) + len(added)
+    assert again.runs_left == 0
+    assert again.boundary().points == certified.boundary().points
+
+
+def test_a_point_is_its_search_until_both_ends_are_certified(study: Study) -> None:
+    one_point = load_study("critical-hamaker", ["sweep.values=[0.5]"], 0.05, certify=True)
+    coordinator, physics = Coordinator(one_point, unknown), TwoNumerics()
+    while (task := coordinator.next_task()) is not None and not is_finer(task):
+        coordinator.answer(task, physics(task))
+    other = coordinator.next_task()
+    assert task is not None
+    assert other is not None
+    assert coordinator.next_task() is None
+    (point,) = coordinator.boundary().points
+    assert (task.value, other.value) == point.bracket, "both ends at once"
+    assert (point.status, point.certified, point.certified_by) == ("certifying", False, None)
+    assert coordinator.runs_left == 2
+    coordinator.answer(task, Outcome.FAILED)
+    assert coordinator.boundary().points[0].bracket == point.bracket
+    assert coordinator.boundary().points[0].status == "certifying"
+
+
+def test_what_cannot_be_certified_says_so_and_keeps_its_bracket(study: Study) -> None:
+    physics = TwoNumerics()
+    plain = Coordinator(load_study("critical-hamaker", ["sweep.values=[0.25, 0.75, 1.5]"], 0.05), unknown)
+    trace(plain, physics)
+    failing = Coordinator(study, unknown)
+    trace(failing, lambda task: Outcome.FAILED if is_finer(task) else physics(task), 2)
+    for point, searched in zip(failing.boundary().points, plain.boundary().points, strict=True):
+        assert (point.status, point.certified, point.certified_by) == ("uncertified", False, None)
+        assert (point.bracket, point.outcomes) == (searched.bracket, searched.outcomes)
+
+
+def test_a_contradiction_at_the_finer_numerics_is_reported(study: Study) -> None:
+    physics = TwoNumerics()
+    values: dict[float, list[float]] = {}
+    swapped = {Outcome.BOUND: Outcome.SEPARATED, Outcome.SEPARATED: Outcome.BOUND}
+
+    def contrary(task: Trial) -> Outcome:
+        """Two finer runs of a point, those at the ends of its bracket, come out on the wrong sides."""
+        if is_finer(task):
+            values.setdefault(task.sweep_value, []).append(task.value)
+            if len(values[task.sweep_value]) <= 2:
+                return swapped[physics(task)]
+        return physics(task)
+
+    coordinator = Coordinator(study, unknown)
+    trace(coordinator, contrary, 8)
+    for point in coordinator.boundary().points:
+        assert (point.status, point.certified) == ("non-monotone", False)
+        low, high = point.bracket
+        assert low is not None
+        assert high is not None
+        assert GRID.index(high) - GRID.index(low) == 3
+
+
+def test_a_late_answer_that_contradicts_the_search_ends_its_certification() -> None:
+    one_point = load_study("critical-hamaker", ["sweep.values=[0.5]"], 0.05, certify=True)
+    coordinator, physics = Coordinator(one_point, unknown), TwoNumerics()
+    late = coordinator.next_task()
+    assert late is not None
+    while (task := coordinator.next_task()) is not None and not is_finer(task):
+        coordinator.answer(task, physics(task))
+    assert task is not None
+    assert late in coordinator.pointless_tasks()
+    above = late.value > task.value
+    coordinator.answer(late, Outcome.SEPARATED if above else Outcome.BOUND)
+    assert coordinator.boundary().points[0].status == "non-monotone"
+    assert coordinator.done
+    assert coordinator.pointless_tasks() == (task,)
+    coordinator.cancelled(task)
+    assert coordinator.next_task() is None
+
+
+def test_certifying_comes_before_a_second_task_of_one_search() -> None:
+    two_points = load_study("critical-hamaker", ["sweep.values=[0.5, 1.0]"], 0.05, certify=True)
+    coordinator, physics = Coordinator(two_points, unknown), TwoNumerics()
+    tasks: list[Trial] = []
+    while not any(map(is_finer, tasks)):
+        task = coordinator.next_task()
+        assert task is not None
+        tasks.append(task)
+        if task.sweep_value == 0.5 and not is_finer(task):
+            coordinator.answer(task, physics(task))
+    other_end, second = coordinator.next_task(), coordinator.next_task()
+    assert tasks[-1].sweep_value == 0.5
+    assert len([task for task in tasks if task.sweep_value == 1.0]) == 1
+    assert other_end is not None
+    assert is_finer(other_end)
+    assert second is not None
+    assert second.sweep_value == 1.0
+
+
+def test_a_search_that_others_finish_meanwhile_is_certified_at_once() -> None:
+    one_point = load_study("critical-hamaker", ["sweep.values=[0.5]"], 0.05, certify=True)
+    known: dict[str, Outcome] = {}
+    coordinator, physics = Coordinator(one_point, known.get), TwoNumerics()
+    out = coordinator.next_task()
+    scenes = [one_point.scene_at(0.5, GRID.value(index)) for index in INDICES]
+    tasks = [
+        Trial(sweep_value=0.5, value=GRID.value(i), scene=scene, key=run_key(scene))
+        for i, scene in zip(INDICES, scenes, strict=True)
+    ]
+    known.update({task.key: physics(task) for task in tasks})
+    task = coordinator.next_task()
+    assert task is not None
+    assert is_finer(task)
+    assert coordinator.pointless_tasks() == (out,)
+
+
+def test_tables_name_the_numerics_and_old_documents_are_read() -> None:
+    document = {
+        "parameters": {"flow.rate": 0.5},
+        "bracket": (0.25, 1.0),
+        "outcomes": ("separated", "bound"),
+        "status": "converged",
+        "certified": False,
+        "runs": [],
+    }
+    old = BoundaryPoint.model_validate(document)
+    new = old.model_copy(update={"certified": True, "certified_by": Numerics(points=128, tolerance=1e-5)})
+    assert BoundaryPoint.model_validate_json(new.model_dump_json()) == new
+    shown = [dict(zip(boundary_columns([p]), boundary_cells(p), strict=True)) for p in (old, new)]
+    assert [cells["certified by"] for cells in shown] == ["–", "128 points, 1e-05"]

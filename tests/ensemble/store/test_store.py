@@ -1,0 +1,398 @@
+"""The store: exact, and whole after any kill."""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray
+
+from ensemble.store import Store, StoreError, StoreInputError
+from ensemble.store.run_key import run_key
+from solver.analysis.run import Outcome, Run
+from solver.scene import Criteria, Numerics
+from solver.simulation.simulate import simulate
+from tests.ensemble.runs import assert_same_run, failed_run, shear_run, shear_scene
+
+PRELUDE = """
+import sys
+from pathlib import Path
+from ensemble.store import Store
+from tests.ensemble.runs import shear_run, shear_scene
+def numbered_run(number):
+    return shear_run(shear_scene(rate=1 + number / 128), seed=number)
+"""
+
+SAVE_FOREVER = """
+number = int(sys.argv[2])
+with Store.open(Path(sys.argv[1])) as store:
+    while True:
+        store.save(numbered_run(number))
+        print(number, flush=True)
+        number += 1
+"""
+
+SAVE_AND_SWEEP = """
+for number in range(int(sys.argv[2]), int(sys.argv[3])):
+    with Store.open(Path(sys.argv[1])) as store:
+        staged = store.stage(numbered_run(number))
+        store.sweep()
+        store.commit(staged)
+        print(number, flush=True)
+"""
+
+DIE_BEFORE_THE_CATALOG = """
+import os, signal
+from ensemble.store.catalog import Catalog
+Catalog.insert = lambda *_: os.kill(os.getpid(), signal.SIGKILL)
+with Store.open(Path(sys.argv[1])) as store:
+    store.save(numbered_run(0))
+"""
+
+STAGE_AND_WAIT = """
+import pickle
+with Store.open(Path(sys.argv[1])) as store:
+    print(pickle.dumps(store.stage(numbered_run(0))).hex(), flush=True)
+    sys.stdin.read()
+"""
+
+
+def numbered_run(number: int) -> Run:
+    return shear_run(shear_scene(rate=1 + number / 128), seed=number)
+
+
+def start(script: str, *arguments: object) -> subprocess.Popen[Any]:
+    return subprocess.Popen(
+        [sys.executable, "-c", PRELUDE + script, *map(str, arguments)],
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+    )
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Iterator[Store]:
+    with Store.open(tmp_path / "store") as opened:
+        yield opened
+
+
+def run_directories(store: Store) -> set[str]:
+    return {entry.name for entry in (store.path / "runs").iterdir()}
+
+
+# Saving and loading
+
+
+@pytest.mark.parametrize(
+    "run",
+    [
+        shear_run(),
+        failed_run(),
+        shear_run(frames=0),
+        shear_run(shear_scene(points=256), samples=3, frames=600),  # several chunks
+    ],
+    ids=["shear", "failed", "no frames", "several chunks"],
+)
+def test_run_comes_back_bit_for_bit(store: Store, run: Run) -> None:
+    key = store.save(run)
+    assert key == run_key(run.scene)
+    assert_same_run(store.load(key), run)
+    assert store.check() == []
+    with Store.existing(store.path) as reopened:
+        assert_same_run(reopened.load(key), run)
+
+
+def test_a_run_whose_points_were_raised_comes_back(store: Store) -> None:
+    """Its frames are checked against the number it ended with, which filters find, too."""
+    scene = shear_scene().model_copy(update={"numerics": Numerics(points="auto"), "horizon": 8.0})
+    run = simulate(scene.model_copy(update={"criteria": Criteria(extensions=1.0)}))
+    assert run.work.points
+    assert run.work.points > 32
+    store.save(run)
+    assert_same_run(store.load(run_key(run.scene)), run)
+    assert store.check() == []
+    found = [store.summaries([where]) for where in ("numerics.points=auto", f"work.points={run.work.points}")]
+    assert [[summary.key for summary in summaries] for summaries in found] == [[run_key(run.scene)]] * 2
+    assert store.summaries(["numerics.points<64"]) == store.summaries(["numerics.points!=auto"]) == []
+
+
+def test_frames_of_another_number_of_points_are_reported(store: Store) -> None:
+    run = shear_run(shear_scene(points=32))
+    store.save(replace(run, work=replace(run.work, points=48)))
+    assert [problem.partition(" has shape ")[0] for problem in store.check()] == [
+        f"run {run_key(run.scene)}: array {name}" for name in ("tangent_angle", "tension")
+    ]
+
+
+def test_long_arrays_are_stored_in_several_chunks(store: Store) -> None:
+    key = store.save(shear_run(shear_scene(points=256), samples=3, frames=600))
+    chunks = [path for path in (store.path / "runs" / key / "tension" / "c").rglob("*") if path.is_file()]
+    assert len(chunks) > 1
+
+
+def test_xarray_opens_a_run_as_one_data_set(store: Store) -> None:
+    run = shear_run()
+    key = store.save(run)
+    with xarray.open_zarr(store.path / "runs" / key, consolidated=False) as data:
+        assert set(data.coords) == {"time", "frame_time"}
+        assert data["gap"].dims == ("time",)
+        assert data["tangent_angle"].dims == ("frame_time", "vesicle", "point")
+        assert data["center"].dims == ("frame_time", "vesicle", "axis")
+        np.testing.assert_array_equal(data["tension"].sel(frame_time=3.0), run.frames.tension[3])
+        np.testing.assert_array_equal(data["gap"].sel(time=2.5), run.series["gap"][10])
+        assert data.attrs["outcome"] == "bound"
+        assert data.attrs["scene"] == run.scene.model_dump(mode="json")
+
+
+def test_summary_holds_every_scalar(store: Store) -> None:
+    run = shear_run()
+    before = datetime.now(UTC)
+    key = store.save(run)
+    summary = store.summary(key)
+    assert store.summaries() == [summary]
+    assert (summary.key, summary.scene, summary.outcome) == (key, run.scene, Outcome.BOUND)
+    assert (summary.viscosity, summary.energy, summary.error) == (run.viscosity, run.energy, run.error)
+    assert summary.wall_seconds == run.work.wall_seconds
+    assert before <= summary.created <= datetime.now(UTC)
+    assert {"vesicle-ensemble", "numpy", "scipy", "numba", "python"} <= summary.versions.keys()
+
+
+def test_unknown_run(store: Store) -> None:
+    assert not store.contains("abc")
+    assert store.outcome("abc") is None
+    for read in (store.load, store.summary):
+        with pytest.raises(StoreInputError, match="no run abc"):
+            read("abc")
+
+
+def test_staging_alone_makes_nothing_exist(store: Store) -> None:
+    staged = store.stage(shear_run())
+    assert not store.contains(staged.key)
+    assert store.summaries() == []
+    assert store.commit(staged) == staged.key
+    assert store.outcome(staged.key) is Outcome.BOUND
+
+
+def test_second_commit_of_a_key_keeps_the_first_run(store: Store) -> None:
+    first, second = store.stage(shear_run(seed=1)), store.stage(shear_run(seed=2))
+    assert store.commit(first) == store.commit(second) == store.commit(first)
+    assert_same_run(store.load(first.key), shear_run(seed=1))
+    assert not second.directory.exists()
+    assert store.check() == []
+
+
+# Opening
+
+
+def test_file_as_store_is_refused_and_left_alone(tmp_path: Path) -> None:
+    path = tmp_path / "results"
+    path.write_text("mine")
+    with pytest.raises(ValueError, match=r"^store: .*results is a file"):
+        Store.open(path)
+    with pytest.raises(ValueError, match=r"^store: "):
+        Store.existing(path)
+    with pytest.raises(ValueError, match=r"^store: "):
+        Store.open(path / "inside")
+    assert list(tmp_path.iterdir()) == [path]
+    assert path.read_text() == "mine"
+
+
+def test_directory_of_something_else_never_becomes_a_store(tmp_path: Path) -> None:
+    (tmp_path / "runs" / "precious").mkdir(parents=True)
+    with pytest.raises(StoreInputError, match="already holds runs"):
+        Store.open(tmp_path)
+    assert list(tmp_path.rglob("*")) == [tmp_path / "runs", tmp_path / "runs" / "precious"]
+
+
+def test_damaged_catalog_is_refused(tmp_path: Path) -> None:
+    with Store.open(tmp_path / "store") as store:
+        store.save(shear_run())
+    (tmp_path / "store" / "catalog.sqlite").write_bytes(b"no database" * 1000)
+    for opening in (Store.open, Store.existing):
+        with pytest.raises(StoreInputError, match=r"^store: .*cannot be opened"):
+            opening(tmp_path / "store")
+
+
+def test_existing_creates_nothing(tmp_path: Path) -> None:
+    with pytest.raises(StoreInputError, match="no store at"):
+        Store.existing(tmp_path / "store")
+    assert list(tmp_path.iterdir()) == []
+
+
+# Being killed, and company
+
+
+def test_kill_at_any_moment_loses_no_acknowledged_run(tmp_path: Path) -> None:
+    path = tmp_path / "store"
+    moment = random.Random(11)
+    acknowledged: list[int] = []
+    torn = 0
+    for _ in range(20):
+        number = max(acknowledged, default=-1) + 2  # the one that was underway may or may not be there
+        with start(SAVE_FOREVER, path, number) as writer:
+            assert writer.stdout is not None
+            lines = writer.stdout.readline()
+            time.sleep(moment.uniform(0, 0.25))
+            writer.kill()
+            acknowledged += map(int, (lines + writer.stdout.read()).split())
+        torn += any((path / "staging").glob("*/*/zarr.json"))
+        with Store.open(path) as store:
+            assert list((path / "staging").iterdir()) == []
+            assert run_directories(store) == {summary.key for summary in store.summaries()}
+            assert all(store.contains(run_key(numbered_run(number).scene)) for number in acknowledged)
+    assert len(acknowledged) >= 20
+    assert torn > 0, "no writer was killed in the middle of a run"
+    with Store.existing(path) as store:
+        assert store.check() == []
+        for number in acknowledged:
+            run = numbered_run(number)
+            assert_same_run(store.load(run_key(run.scene)), run)
+
+
+def test_two_processes_write_and_sweep_at_once(tmp_path: Path) -> None:
+    path = tmp_path / "store"  # created by whichever comes first
+    with start(SAVE_AND_SWEEP, path, 0, 16) as first, start(SAVE_AND_SWEEP, path, 8, 24) as second:
+        printed = [process.communicate()[0] for process in (first, second)]
+    assert (first.returncode, second.returncode) == (0, 0)
+    assert [list(map(int, lines.split())) for lines in printed] == [list(range(16)), list(range(8, 24))]
+    with Store.existing(path) as store:
+        assert store.check() == []
+        assert len(store.summaries()) == 24
+        for number in range(24):
+            run = numbered_run(number)
+            assert_same_run(store.load(run_key(run.scene)), run)
+
+
+def test_run_staged_by_another_process_is_committed_here(store: Store) -> None:
+    with start(STAGE_AND_WAIT, store.path) as writer:
+        assert writer.stdout is not None
+        staged = pickle.loads(bytes.fromhex(writer.stdout.readline().decode()))
+        store.sweep()  # spares it: its writer lives
+        assert store.check() == []
+        key = store.commit(staged)
+        writer.communicate()
+    assert writer.returncode == 0
+    assert_same_run(store.load(key), numbered_run(0))
+    assert store.check() == []
+
+
+def test_death_between_rename_and_catalog(store: Store) -> None:
+    with start(DIE_BEFORE_THE_CATALOG, store.path) as writer:
+        writer.communicate()
+    assert writer.returncode == -signal.SIGKILL
+    run = numbered_run(0)
+    key = run_key(run.scene)
+    assert run_directories(store) == {key}
+    assert not store.contains(key)
+    assert store.summaries() == []
+    assert store.check() == []  # what has no row was never part of the store
+
+    shutil.copytree(store.path, store.path.with_name("copy"))
+    with Store.open(store.path.with_name("copy")) as swept:
+        assert run_directories(swept) == set()
+        assert swept.check() == []
+
+    (store.path / "runs" / key / "zarr.json").write_text("torn")
+    assert store.save(run) == key
+    assert_same_run(store.load(key), run)
+
+
+def test_closing_removes_what_was_not_committed(tmp_path: Path) -> None:
+    with Store.open(tmp_path / "store") as store:
+        store.stage(shear_run())
+    assert list((tmp_path / "store" / "staging").iterdir()) == []
+
+
+# Checking
+
+
+def flip_a_bit(run: Path) -> None:
+    chunk = run / "tangent_angle" / "c" / "0" / "0" / "0"
+    data = bytearray(chunk.read_bytes())
+    data[len(data) // 2] ^= 1
+    chunk.write_bytes(data)
+
+
+def truncate_a_chunk(run: Path) -> None:
+    chunk = run / "gap" / "c" / "0"
+    chunk.write_bytes(chunk.read_bytes()[:-3])
+
+
+def change_attribute(run: Path) -> None:
+    metadata = json.loads((run / "zarr.json").read_text())
+    metadata["attributes"]["gap"] = 0.25
+    (run / "zarr.json").write_text(json.dumps(metadata))
+
+
+def shorten_an_array(run: Path) -> None:
+    metadata = json.loads((run / "gap" / "zarr.json").read_text())
+    metadata["shape"] = [39]
+    (run / "gap" / "zarr.json").write_text(json.dumps(metadata))
+
+
+@pytest.mark.parametrize(
+    ("damage", "problem"),
+    [
+        (flip_a_bit, "tangent_angle cannot be decoded"),
+        (truncate_a_chunk, "gap cannot be decoded"),
+        (lambda run: (run / "tension" / "c" / "0" / "0" / "0").unlink(), "tension has lost 1 of 1 chunks"),
+        (lambda run: shutil.rmtree(run / "center"), "center is missing"),
+        (lambda run: shutil.rmtree(run / "gap"), "gap is missing"),
+        (shutil.rmtree, "no readable group"),
+        (lambda run: (run / "zarr.json").write_text("{"), "no readable group"),
+    ],
+)
+def test_damage_is_reported_and_never_read(
+    store: Store, damage: Callable[[Path], object], problem: str
+) -> None:
+    whole, damaged = store.save(numbered_run(0)), store.save(numbered_run(1))
+    damage(store.path / "runs" / damaged)
+    problems = store.check()
+    assert len(problems) == 1
+    assert damaged in problems[0]
+    assert problem in problems[0]
+    with pytest.raises(StoreError, match=problem):
+        store.load(damaged)
+    assert_same_run(store.load(whole), numbered_run(0))
+
+
+@pytest.mark.parametrize(
+    ("damage", "problem"),
+    [(change_attribute, "differ from its row"), (shorten_an_array, "gap has shape (39,), not (40,)")],
+)
+def test_inconsistency_is_reported(store: Store, damage: Callable[[Path], object], problem: str) -> None:
+    key = store.save(shear_run())
+    damage(store.path / "runs" / key)
+    (reported,) = store.check()
+    assert problem in reported
+
+
+def test_values_that_are_not_finite_are_reported_unless_the_run_failed(store: Store) -> None:
+    run = shear_run()
+    run.frames.tension[2, 0, 5] = np.nan
+    store.save(run)
+    store.save(failed_run())
+    (problem,) = store.check()
+    assert "tension holds values that are not finite" in problem
+
+
+def test_leftover_of_a_dead_writer_is_no_damage_and_is_swept(store: Store) -> None:
+    leftover = store.path / "staging" / "dead" / "run"
+    leftover.mkdir(parents=True)
+    assert store.check() == []
+    store.sweep()
+    assert not leftover.parent.exists()
