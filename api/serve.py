@@ -99,7 +99,7 @@ def configuration(app: FastAPI, settings: Settings, host: str, port: int) -> uvi
 
 
 def _beside_workers(service: Service, workers: int) -> Callable[[FastAPI], AbstractAsyncContextManager[None]]:
-    command = [sys.executable, "-P", "-m", "ensemble.cli.main", "worker", "--end-with-input"]
+    command = [sys.executable, "-P", "-m", "ensemble", "worker", "--end-with-input"]
     command += ["--store", str(service.store.path)]
 
     @asynccontextmanager

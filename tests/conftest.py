@@ -16,7 +16,7 @@ import pytest
 
 from tests import postgresql
 
-ENSEMBLE = (sys.executable, "-m", "ensemble.cli.main")
+ENSEMBLE = (sys.executable, "-m", "ensemble")
 SECONDS = 240
 
 # Three points of the preset's boundary at a coarse resolution: a dozen runs of about half a second.

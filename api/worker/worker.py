@@ -30,7 +30,7 @@ log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
-class Verdict:
+class JobResult:
     """How a job has ended."""
 
     status: Status
@@ -64,7 +64,7 @@ class Worker:
     def _carry_out(self, lease: Lease, stop: threading.Event) -> None:
         job = lease.job
         if job.attempts > MAXIMUM_ATTEMPTS:
-            self._end(lease, Verdict(Status.FAILED, f"given up: cut short {MAXIMUM_ATTEMPTS} times"))
+            self._end(lease, JobResult(Status.FAILED, f"given up: cut short {MAXIMUM_ATTEMPTS} times"))
             return
         log.info("job %s: attempt %d", job.id, job.attempts)
         deadline = time.monotonic() + job.seconds
@@ -76,14 +76,16 @@ class Worker:
                     return
                 if time.monotonic() > deadline:
                     process.end()
-                    self._end(lease, Verdict(Status.FAILED, f"stopped at its time limit, {job.seconds:g} s"))
+                    self._end(
+                        lease, JobResult(Status.FAILED, f"stopped at its time limit, {job.seconds:g} s")
+                    )
                     return
                 progress = process.progress
                 if not self._jobs.heartbeat(lease, int(100 * progress.fraction), progress.message):
                     log.info("job %s: no longer this worker's", job.id)
                     return
             if status in _OWN_STATUSES:
-                self._end(lease, verdict(job.kind, status, process.output(), process.last_words))
+                self._end(lease, job_result(job.kind, status, process.output(), process.last_words))
             else:
                 log.warning("job %s: cut short with status %d", job.id, status)
                 self._jobs.give_back(lease, "its processes were killed; waiting for another attempt")
@@ -98,12 +100,12 @@ class Worker:
             *("--progress", "json", "--json"),
         ]
 
-    def _end(self, lease: Lease, verdict: Verdict) -> None:
-        if self._jobs.finish(lease, verdict.status, verdict.message):
-            log.info("job %s: %s, %s", lease.job.id, verdict.status, verdict.message)
+    def _end(self, lease: Lease, job_result: JobResult) -> None:
+        if self._jobs.finish(lease, job_result.status, job_result.message):
+            log.info("job %s: %s, %s", lease.job.id, job_result.status, job_result.message)
 
 
-def verdict(kind: Kind, status: int, output: str, last_words: str) -> Verdict:
+def job_result(kind: Kind, status: int, output: str, last_words: str) -> JobResult:
     """Say how a job has ended from what the command line did.
 
     Parameters
@@ -119,9 +121,9 @@ def verdict(kind: Kind, status: int, output: str, last_words: str) -> Verdict:
     try:
         document = json.loads(output)
     except json.JSONDecodeError:
-        return Verdict(Status.FAILED, last_words or f"ended with status {status}")
+        return JobResult(Status.FAILED, last_words or f"ended with status {status}")
     message = _study_message(document) if kind is Kind.STUDY else document["failure"] or document["outcome"]
-    return Verdict(Status.SUCCEEDED if status == 0 else Status.FAILED, message)
+    return JobResult(Status.SUCCEEDED if status == 0 else Status.FAILED, message)
 
 
 def _study_message(document: Mapping[str, Any]) -> str:

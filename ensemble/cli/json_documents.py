@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from ensemble.store.run_record import RunSummary
 
 if TYPE_CHECKING:
-    from ensemble.mpi.run_study import Traced
+    from ensemble.mpi.run_study import StudyResult
 
 _WORK = ("points", "steps", "rejected_steps", "rhs_evaluations", "wall_seconds")
 _RESULTS = (
@@ -36,7 +36,7 @@ def run_document(summary: RunSummary) -> dict[str, Any]:
     )
 
 
-def study_document(traced: Traced, store: Path) -> dict[str, Any]:
+def study_document(traced: StudyResult, store: Path) -> dict[str, Any]:
     """A traced boundary and what it cost; `busy_fraction` is None when nothing had to be run."""
     cost = traced.cost
     return {

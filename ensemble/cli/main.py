@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from ensemble.config.study import Study
-    from ensemble.mpi.run_study import Traced
-    from ensemble.mpi.usage import Cost
+    from ensemble.mpi.run_study import StudyResult
+    from ensemble.mpi.usage import RunUsage
     from ensemble.report.files import Report
     from ensemble.search.boundary import Boundary
     from ensemble.store import Store
@@ -161,19 +161,19 @@ def _prepare(
 
 def _trace(
     communicator: Intracomm, study: Study, path: Path, progress: ProgressFormat, ranks_per_run: int
-) -> Traced:
+) -> StudyResult:
     from rich.console import Console
 
     from ensemble.cli.progress import study_lines, study_progress
-    from ensemble.mpi.run_study import trace
+    from ensemble.mpi.run_study import run_study
     from ensemble.store import Store
 
     shown = study_lines if progress is ProgressFormat.JSON else study_progress
     with Store.existing(path) as store, shown(Console(stderr=True)) as show:
-        return trace(communicator, study, store, show, ranks_per_run)
+        return run_study(communicator, study, store, show, ranks_per_run)
 
 
-def _cost(cost: Cost) -> str:
+def _cost(cost: RunUsage) -> str:
     runs = f"{cost.runs} runs in {cost.wall_seconds:.1f} s"
     if not cost.busy_fractions:
         return runs

@@ -21,7 +21,7 @@ from rich.text import Text
 from ensemble.cli.result_tables import boundary_cells, boundary_columns, bracket_text
 
 if TYPE_CHECKING:
-    from ensemble.mpi.dispatcher import Standing
+    from ensemble.mpi.dispatcher import JobProgress
     from ensemble.mpi.run_study import Snapshot
 
 
@@ -39,9 +39,9 @@ def study_lines(console: Console) -> Iterator[Callable[[Snapshot], None]]:
     """Give a function that prints the latest snapshot of a study as a `ProgressLine`."""
 
     def show(snapshot: Snapshot) -> None:
-        elapsed, left = snapshot.standing.elapsed, snapshot.standing.seconds_left
+        elapsed, left = snapshot.progress.elapsed, snapshot.progress.seconds_left
         fraction = 0.0 if left is None else elapsed / (elapsed + left)
-        _print_line(console, fraction, standing_text(snapshot.standing))
+        _print_line(console, fraction, progress_text(snapshot.progress))
 
     yield show
 
@@ -72,7 +72,7 @@ def study_progress(console: Console) -> Iterator[Callable[[Snapshot], None]]:
     if console.is_terminal:
         with Live(console=console) as live:
             yield lambda snapshot: live.update(
-                Group(_table(snapshot), Text(standing_text(snapshot.standing)))
+                Group(_table(snapshot), Text(progress_text(snapshot.progress)))
             )
     else:
         yield _Lines(console).show
@@ -91,24 +91,24 @@ def _table(snapshot: Snapshot) -> Table:
     table = Table(*boundary_columns(points), "running")
     for point in points:
         (at,) = point.parameters.values()
-        values = sorted(task.value for task in snapshot.standing.running.values() if task.sweep_value == at)
+        values = sorted(task.value for task in snapshot.progress.running.values() if task.sweep_value == at)
         table.add_row(*boundary_cells(point), ", ".join(f"{value:.6g}" for value in values))
     return table
 
 
-def standing_text(standing: Standing[Any]) -> str:
+def progress_text(progress: JobProgress[Any]) -> str:
     """Say in one line how far the runs of a job have come."""
-    known = f" and {standing.known} from the store" if standing.known else ""
+    known = f" and {progress.known} from the store" if progress.known else ""
     return (
-        f"{standing.runs} runs{known}, {len(standing.running)} running, "
-        f"{_duration(standing.elapsed)} elapsed, {_time_left(standing)}"
+        f"{progress.runs} runs{known}, {len(progress.running)} running, "
+        f"{_duration(progress.elapsed)} elapsed, {_time_left(progress)}"
     )
 
 
-def _time_left(standing: Standing[Any]) -> str:
-    if standing.seconds_left is None:
+def _time_left(progress: JobProgress[Any]) -> str:
+    if progress.seconds_left is None:
         return "time left unknown"
-    return f"about {_duration(standing.seconds_left)} left"
+    return f"about {_duration(progress.seconds_left)} left"
 
 
 def _duration(seconds: float) -> str:
@@ -130,5 +130,5 @@ class _Lines:
             if point.runs and line != self._shown.get(at):
                 self._shown[at] = line
                 self._console.print(
-                    f"{line} ({standing_text(snapshot.standing)})", soft_wrap=True, highlight=False
+                    f"{line} ({progress_text(snapshot.progress)})", soft_wrap=True, highlight=False
                 )

@@ -20,7 +20,7 @@ from pydantic import AfterValidator, Field, ValidationError, ValidationInfo, fie
 
 from ensemble.config.overrides import explain, locations, override, parse_override, value_at
 from ensemble.search.certification import Certification, finer
-from ensemble.search.critical_value import CriticalValue, Side
+from ensemble.search.critical_value import CriticalValueSearch, Side
 from ensemble.search.grid import GeometricGrid
 from solver.analysis.run import Outcome
 from solver.scene import Model, Positive, Scene
@@ -164,9 +164,9 @@ class Study(Model):
             return Side.HIGH
         return NO_ANSWER.get(outcome, Side.UNDECIDED)
 
-    def critical_value(self, guess: tuple[float, float] | None = None) -> CriticalValue:
+    def critical_value(self, guess: tuple[float, float] | None = None) -> CriticalValueSearch:
         """Return a new search for one point of the boundary."""
-        return CriticalValue(GeometricGrid(self.search.tolerance), self.search.limits, guess)
+        return CriticalValueSearch(GeometricGrid(self.search.tolerance), self.search.limits, guess)
 
     def certification(self, bracket: tuple[float, float]) -> Certification:
         """Return a new certification of the bracket at which one of the searches has converged."""

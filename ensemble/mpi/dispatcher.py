@@ -1,4 +1,4 @@
-"""Makes the runs of an agenda on all groups of ranks.
+"""Makes the runs of a task queue on all groups of ranks.
 
 Every rank simulates, together with the others of its group.  Rank 0 also runs the dispatcher, in a thread
 beside its own simulations: it alone decides what is run next and alone writes to the database, so ranks
@@ -17,9 +17,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, cast
 
 from ensemble.mpi.groups import Groups
-from ensemble.mpi.usage import Cost, Usage
+from ensemble.mpi.usage import RunUsage, Usage
 from ensemble.mpi.world import abort_guard
-from ensemble.search.task_queue import Agenda, SomeTask, Task
+from ensemble.search.task_queue import SomeTask, Task, TaskQueue
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
@@ -71,8 +71,8 @@ Report = Ready | Finished | Stopped
 
 
 @dataclass(frozen=True)
-class Standing(Generic[SomeTask]):
-    """How far an agenda has come."""
+class JobProgress(Generic[SomeTask]):
+    """How far a task queue has come."""
 
     running: Mapping[int, SomeTask]  # by the rank of the group's leader among all leaders
     runs: int  # finished so far, without those that the store already had
@@ -151,13 +151,13 @@ class _Cancellation:
 
 
 class Dispatcher(Generic[SomeTask]):
-    """Answers reports with orders until the agenda needs no further run.
+    """Answers reports with orders until the queue needs no further run.
 
     Parameters
     ----------
     communicator : Intracomm
         The leaders of all groups, all ranks of which `work` meanwhile.
-    agenda : Agenda
+    queue : TaskQueue
     store : Store
     on_change : callable
         Called whenever an outcome or an assignment changed something.
@@ -168,13 +168,13 @@ class Dispatcher(Generic[SomeTask]):
     def __init__(
         self,
         communicator: Intracomm,
-        agenda: Agenda[SomeTask],
+        queue: TaskQueue[SomeTask],
         store: Store,
-        on_change: Callable[[Standing[SomeTask]], None],
+        on_change: Callable[[JobProgress[SomeTask]], None],
         usage: Usage,
     ) -> None:
         self._communicator = communicator
-        self._agenda = agenda
+        self._queue = queue
         self._store = store
         self._on_change = on_change
         self._usage = usage
@@ -183,17 +183,17 @@ class Dispatcher(Generic[SomeTask]):
         self._cancelled: set[str] = set()
         self._runs = 0
 
-    def run(self) -> Cost:
+    def run(self) -> RunUsage:
         """Dispatch from the first report to the last order."""
-        while len(self._idle) < self._communicator.Get_size() or not self._agenda.done:
+        while len(self._idle) < self._communicator.Get_size() or not self._queue.done:
             report, rank = self._wait()
             self._take(report, rank)
             self._cancel_pointless()
             self._assign()
-            self._on_change(self._standing())
+            self._on_change(self._progress())
         for rank in self._idle:
             _send(self._communicator, Stop(), rank, _ORDERS)
-        return Cost(self._runs, self._usage.elapsed, self._usage.fractions())
+        return RunUsage(self._runs, self._usage.elapsed, self._usage.fractions())
 
     def _wait(self) -> tuple[Report, int]:
         while (received := _receive(self._communicator, _REPORTS)) is None:
@@ -205,16 +205,16 @@ class Dispatcher(Generic[SomeTask]):
             case Finished(staged, outcome, seconds):
                 task = self._running.pop(rank)
                 self._store.commit(staged)
-                self._agenda.answer(task, outcome)
+                self._queue.answer(task, outcome)
                 self._runs += 1
                 self._usage.ran(rank, seconds)
             case Stopped(seconds):
-                self._agenda.cancelled(self._running.pop(rank))
+                self._queue.cancelled(self._running.pop(rank))
                 self._usage.ran(rank, seconds)
         self._idle.add(rank)
 
     def _cancel_pointless(self) -> None:
-        pointless = {task.key for task in self._agenda.pointless_tasks()}
+        pointless = {task.key for task in self._queue.pointless_tasks()}
         for rank, task in self._running.items():
             if task.key in pointless - self._cancelled:
                 _send(self._communicator, Cancel(task.key), rank, _ORDERS)
@@ -222,7 +222,7 @@ class Dispatcher(Generic[SomeTask]):
 
     def _assign(self) -> None:
         for rank in sorted(self._idle):
-            task = self._agenda.next_task()
+            task = self._queue.next_task()
             if task is None:
                 break
             self._cancelled.discard(task.key)
@@ -231,11 +231,11 @@ class Dispatcher(Generic[SomeTask]):
             _send(self._communicator, task, rank, _ORDERS)
         self._usage.idle(len(self._idle))
 
-    def _standing(self) -> Standing[SomeTask]:
-        return Standing(
+    def _progress(self) -> JobProgress[SomeTask]:
+        return JobProgress(
             running=dict(self._running),
             runs=self._runs,
-            known=self._agenda.known_answers,
+            known=self._queue.known_answers,
             elapsed=self._usage.elapsed,
             seconds_left=self._seconds_left(),
         )
@@ -243,7 +243,7 @@ class Dispatcher(Generic[SomeTask]):
     def _seconds_left(self) -> float | None:
         if self._usage.mean_run is None:
             return None
-        return self._usage.mean_run * self._agenda.runs_left / self._communicator.Get_size()
+        return self._usage.mean_run * self._queue.runs_left / self._communicator.Get_size()
 
 
 def _send(communicator: Intracomm, message: Order | Report, rank: int, tag: int) -> None:

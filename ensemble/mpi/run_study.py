@@ -8,14 +8,14 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar, cast
 
-from ensemble.mpi.dispatcher import Dispatcher, Standing, work
+from ensemble.mpi.dispatcher import Dispatcher, JobProgress, work
 from ensemble.mpi.groups import Groups
-from ensemble.mpi.usage import Cost, Usage
+from ensemble.mpi.usage import RunUsage, Usage
 from ensemble.mpi.world import abort_guard
 from ensemble.search.batch import Batch
-from ensemble.search.point_search import Trial
-from ensemble.search.study_planner import Coordinator
-from ensemble.search.task_queue import Agenda, Task
+from ensemble.search.point_search import SearchRun
+from ensemble.search.study_planner import StudyPlanner
+from ensemble.search.task_queue import Task, TaskQueue
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
@@ -33,24 +33,24 @@ class Snapshot:
     """Where a study stands."""
 
     boundary: Boundary
-    standing: Standing[Trial]
+    progress: JobProgress[SearchRun]
 
 
 @dataclass(frozen=True)
-class Traced:
+class StudyResult:
     """A study's result, and what it cost."""
 
     boundary: Boundary
-    cost: Cost
+    cost: RunUsage
 
 
-def trace(
+def run_study(
     communicator: Intracomm,
     study: Study,
     store: Store,
     on_change: Callable[[Snapshot], None],
     ranks_per_run: int = 1,
-) -> Traced:
+) -> StudyResult:
     """Trace the boundary of a study, running what the store does not have.
 
     Collective.
@@ -73,28 +73,28 @@ def trace(
         On every rank.
     """
 
-    def begin() -> Coordinator:
-        return Coordinator(study, store.outcome, (summary.scene for summary in store.summaries()))
+    def begin() -> StudyPlanner:
+        return StudyPlanner(study, store.outcome, (summary.scene for summary in store.summaries()))
 
-    def publish(coordinator: Coordinator, standing: Standing[Trial]) -> None:
-        boundary = coordinator.boundary()
+    def publish(planner: StudyPlanner, progress: JobProgress[SearchRun]) -> None:
+        boundary = planner.boundary()
         store.save_boundary(boundary)
-        on_change(Snapshot(boundary, standing))
+        on_change(Snapshot(boundary, progress))
 
-    boundary, cost = carry_out(communicator, ranks_per_run, store, begin, publish, Coordinator.boundary)
-    return Traced(boundary, cost)
+    boundary, cost = carry_out(communicator, ranks_per_run, store, begin, publish, StudyPlanner.boundary)
+    return StudyResult(boundary, cost)
 
 
 def run_batch(
     communicator: Intracomm,
     scenes: Iterable[Scene],
     store: Store,
-    on_change: Callable[[Standing[Task]], None],
+    on_change: Callable[[JobProgress[Task]], None],
     ranks_per_run: int = 1,
-) -> Cost:
+) -> RunUsage:
     """Run independent scenes, as far as the store does not have their runs.
 
-    Collective; parameters as for `trace`.  A run that fails numerically is made and kept like any other.
+    Collective; parameters as for `run_study`.  A run that fails numerically is made and kept like any other.
 
     Returns
     -------
@@ -106,50 +106,50 @@ def run_batch(
         ranks_per_run,
         store,
         begin=lambda: Batch(scenes, store.outcome),
-        publish=lambda batch, standing: on_change(standing),
+        publish=lambda batch, progress: on_change(progress),
         conclude=lambda batch: None,
     )
     return cost
 
 
-SomeAgenda = TypeVar("SomeAgenda", bound=Agenda)
+SomeTaskQueue = TypeVar("SomeTaskQueue", bound=TaskQueue)
 
 
 def carry_out(
     communicator: Intracomm,
     ranks_per_run: int,
     store: Store,
-    begin: Callable[[], SomeAgenda],
-    publish: Callable[[SomeAgenda, Standing], None],
-    conclude: Callable[[SomeAgenda], Result],
-) -> tuple[Result, Cost]:
-    """Make the runs of an agenda; every rank gets what rank 0 concludes from it, and what it cost.
+    begin: Callable[[], SomeTaskQueue],
+    publish: Callable[[SomeTaskQueue, JobProgress], None],
+    conclude: Callable[[SomeTaskQueue], Result],
+) -> tuple[Result, RunUsage]:
+    """Make the runs of a task queue; every rank gets what rank 0 concludes from it, and what it cost.
 
     Collective.
 
     Parameters
     ----------
     communicator, ranks_per_run, store
-        As for `trace`.
+        As for `run_study`.
     begin : callable
-        Returns the agenda, on rank 0.
+        Returns the queue, on rank 0.
     publish : callable
-        Called as ``on_change`` of `trace` is, with the agenda.
+        Called as ``on_change`` of `run_study` is, with the queue.
     conclude : callable
-        Returns what is wanted of the agenda once it is done; it is pickled.
+        Returns what is wanted of the queue once it is done; it is pickled.
     """
     groups = Groups.of(communicator, ranks_per_run)
     everyone, leaders = groups.everyone, groups.leaders
 
-    def coordinate(leaders: Intracomm) -> tuple[Result, Cost]:
+    def coordinate(leaders: Intracomm) -> tuple[Result, RunUsage]:
         with abort_guard(everyone):
             usage = Usage(leaders.Get_size(), time.perf_counter)
-            agenda = begin()
-            dispatcher = Dispatcher(leaders, agenda, store, lambda standing: publish(agenda, standing), usage)
+            queue = begin()
+            dispatcher = Dispatcher(leaders, queue, store, lambda progress: publish(queue, progress), usage)
             cost = dispatcher.run()
-            return conclude(agenda), cost
+            return conclude(queue), cost
 
-    result: tuple[Result, Cost] | None = None
+    result: tuple[Result, RunUsage] | None = None
     if leaders is not None and leaders.Get_rank() == 0:
         with ThreadPoolExecutor(1, "coordinator") as beside:
             coordination = beside.submit(coordinate, leaders)
@@ -159,4 +159,4 @@ def carry_out(
         work(groups, store)
     result = everyone.bcast(result)
     groups.free()
-    return cast(tuple[Result, Cost], result)
+    return cast(tuple[Result, RunUsage], result)

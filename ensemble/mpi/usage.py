@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Cost:
+class RunUsage:
     """What it took to make the runs of a job.
 
     `busy_fractions` holds one number a group: the share of the time that it spent in simulations, from the

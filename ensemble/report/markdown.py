@@ -8,7 +8,7 @@ from typing import Any
 from ensemble.report.answers import SHEAR_RATE
 from ensemble.report.machine import Machine
 from ensemble.report.report_model import Document
-from ensemble.report.stability import Stability, Verdict
+from ensemble.report.stability import Stability, StabilityVerdict
 from ensemble.report.work_precision import FLOOR, WorkPrecision
 
 _ABSENT = "–"
@@ -149,7 +149,7 @@ def work_precision_text(report: WorkPrecision, figures: Sequence[str]) -> str:
 
 def stability_text(report: Stability, figures: Sequence[str]) -> str:
     """Return the stability report, with figures in these files."""
-    counts = {verdict: sum(row.verdict is verdict for row in report.rows) for verdict in Verdict}
+    counts = {verdict: sum(row.verdict is verdict for row in report.rows) for verdict in StabilityVerdict}
     sections = [
         "# Stiff and extreme scenes",
         _made_on(report.machine),

@@ -14,16 +14,16 @@ from matplotlib.ticker import LogLocator, NullFormatter
 
 from ensemble.figures.style import BLACK, BLUE, GRAY, GREEN, ORANGE, PURPLE, SKY, STYLE, VERMILLION, WIDTH
 from ensemble.report.measurement import Measurement
-from ensemble.report.stability import Stability, Verdict
+from ensemble.report.stability import Stability, StabilityVerdict
 from ensemble.report.work_precision import WorkPrecision
 
 _COLORS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK)  # by method
 _SHAPES = ("o", "s", "^", "D", "v")  # by number of points
 _VERDICTS = {
-    Verdict.FINE: (BLUE, "o"),
-    Verdict.SPACE: (ORANGE, "D"),
-    Verdict.TIME: (PURPLE, "v"),
-    Verdict.FAILED: (VERMILLION, "X"),
+    StabilityVerdict.FINE: (BLUE, "o"),
+    StabilityVerdict.SPACE: (ORANGE, "D"),
+    StabilityVerdict.TIME: (PURPLE, "v"),
+    StabilityVerdict.FAILED: (VERMILLION, "X"),
 }
 
 

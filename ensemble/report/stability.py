@@ -21,7 +21,7 @@ LARGEST_DRIFT = 1e-2  # of area (relative) and closure (over length)
 LARGEST_RISE = 1e-3  # of the energy at rest, over its largest magnitude
 
 
-class Verdict(StrEnum):
+class StabilityVerdict(StrEnum):
     """How far a run can be trusted; `CRITERIA` says when."""
 
     FINE = "fine"
@@ -31,18 +31,18 @@ class Verdict(StrEnum):
 
 
 # In the order in which they are asked: the first that holds is the verdict.
-CRITERIA: Mapping[Verdict, str] = {
-    Verdict.FAILED: "the run gave up, for the reason stated, or raised an error",
-    Verdict.SPACE: (
+CRITERIA: Mapping[StabilityVerdict, str] = {
+    StabilityVerdict.FAILED: "the run gave up, for the reason stated, or raised an error",
+    StabilityVerdict.SPACE: (
         f"the spatial error exceeds {LARGEST_SPATIAL:g}: that is the amplitude (rad) of the last third of "
         "the tangent angle's spectrum, or the relative error across a vesicle's waist or of adhesion at the "
         "smallest gap, whichever is largest"
     ),
-    Verdict.TIME: (
+    StabilityVerdict.TIME: (
         f"resolved in space, yet area or closure drift by more than {LARGEST_DRIFT:g}, or the energy of a "
         f"scene at rest rises by more than {LARGEST_RISE:g} of its largest magnitude"
     ),
-    Verdict.FINE: "none of these",
+    StabilityVerdict.FINE: "none of these",
 }
 
 
@@ -54,7 +54,7 @@ class Row(Document):
 
     group: str
     scene: str
-    verdict: Verdict
+    verdict: StabilityVerdict
     reason: str
     outcome: Outcome
     failure: str | None
@@ -78,7 +78,7 @@ class Stability(Document):
 
     report: str = "stability"
     machine: Machine
-    criteria: Mapping[Verdict, str]
+    criteria: Mapping[StabilityVerdict, str]
     rows: list[Row]
 
 
@@ -108,7 +108,7 @@ def _row(runs: Runs, group: str, name: str, scene: Scene) -> Row:
         return Row(
             group=group,
             scene=name,
-            verdict=Verdict.FAILED,
+            verdict=StabilityVerdict.FAILED,
             reason=failure,
             outcome=Outcome.FAILED,
             failure=failure,
@@ -146,7 +146,7 @@ def energy_rise(run: Run) -> float:
     return float(np.max(energy - np.minimum.accumulate(energy)) / np.max(np.abs(energy)))
 
 
-def judge(run: Run, rise: float | None) -> tuple[Verdict, str]:
+def judge(run: Run, rise: float | None) -> tuple[StabilityVerdict, str]:
     """Verdict by `CRITERIA` and what it rests on.
 
     Parameters
@@ -156,17 +156,17 @@ def judge(run: Run, rise: float | None) -> tuple[Verdict, str]:
         See `energy_rise`; None in a flow.
     """
     if run.outcome is Outcome.FAILED:
-        return Verdict.FAILED, run.failure or "no reason given"
+        return StabilityVerdict.FAILED, run.failure or "no reason given"
     # Written so that NaN, which compares as false, never passes.
     if not run.error.spatial <= LARGEST_SPATIAL:
-        return Verdict.SPACE, f"spatial error {run.error.spatial:.1e}"
+        return StabilityVerdict.SPACE, f"spatial error {run.error.spatial:.1e}"
     if not run.error.area <= LARGEST_DRIFT:
-        return Verdict.TIME, f"area drift {run.error.area:.1e}"
+        return StabilityVerdict.TIME, f"area drift {run.error.area:.1e}"
     if not run.error.closure <= LARGEST_DRIFT:
-        return Verdict.TIME, f"closure {run.error.closure:.1e}"
+        return StabilityVerdict.TIME, f"closure {run.error.closure:.1e}"
     if rise is not None and not rise <= LARGEST_RISE:
-        return Verdict.TIME, f"energy rises by {rise:.1e}"
-    return Verdict.FINE, ""
+        return StabilityVerdict.TIME, f"energy rises by {rise:.1e}"
+    return StabilityVerdict.FINE, ""
 
 
 def _finite(value: float | None) -> float | None:

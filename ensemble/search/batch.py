@@ -14,7 +14,7 @@ _AUTOMATIC_POINTS = 64  # that a scene usually comes to which leaves the number 
 
 
 class Batch:
-    """The agenda of a batch: the longest run first, so that none is left alone at the end.
+    """The task queue of a batch: the longest run first, so that none is left alone at the end.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class Batch:
         self.known_answers = len(tasks) - len(self._waiting)
 
     def next_task(self) -> Task | None:
-        """See `Agenda`."""
+        """See `TaskQueue`."""
         if not self._waiting:
             return None
         task = self._waiting.pop()
@@ -42,26 +42,26 @@ class Batch:
         return task
 
     def answer(self, task: Task, outcome: Outcome) -> None:
-        """See `Agenda`.  Whatever the outcome is, a numerical failure too, the run has been made."""
+        """See `TaskQueue`.  Whatever the outcome is, a numerical failure too, the run has been made."""
         self._running.remove(task.key)
 
     def cancelled(self, task: Task) -> None:
-        """See `Agenda`."""
+        """See `TaskQueue`."""
         self._running.remove(task.key)
         self._waiting.append(task)
 
     def pointless_tasks(self) -> tuple[Task, ...]:
-        """See `Agenda`.  Every run of a batch is wanted."""
+        """See `TaskQueue`.  Every run of a batch is wanted."""
         return ()
 
     @property
     def done(self) -> bool:
-        """See `Agenda`."""
+        """See `TaskQueue`."""
         return not self._waiting and not self._running
 
     @property
     def runs_left(self) -> int:
-        """See `Agenda`."""
+        """See `TaskQueue`."""
         return len(self._waiting) + len(self._running)
 
 

@@ -59,7 +59,7 @@ def finer(scene: Scene) -> Scene:
         raise ValueError(f"to certify, numerics.{explain(error, document)}") from error
 
 
-class Verdict(StrEnum):
+class CertificationResult(StrEnum):
     """What a certification has come to; it is the status of its point.
 
     CERTIFYING : an end has not been found again yet.
@@ -141,19 +141,19 @@ class Certification:
         return self._grid.value(low), self._grid.value(high)
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> CertificationResult:
         """What the certification has come to."""
         if self.ends_left:
-            return Verdict.CERTIFYING
+            return CertificationResult.CERTIFYING
         if self.bracket is None:
-            return Verdict.UNCERTIFIED
+            return CertificationResult.UNCERTIFIED
         contradictory = Side.HIGH in self._met(Side.LOW) and Side.LOW in self._met(Side.HIGH)
-        return Verdict.NON_MONOTONE if contradictory else Verdict.CONVERGED
+        return CertificationResult.NON_MONOTONE if contradictory else CertificationResult.CONVERGED
 
     @property
     def done(self) -> bool:
         """Whether no further answer is needed."""
-        return self.verdict is not Verdict.CERTIFYING
+        return self.verdict is not CertificationResult.CERTIFYING
 
     def _reached(self, side: Side) -> int | None:
         """How far out an end has come: the first index that was not told to be on another side."""

@@ -1,7 +1,7 @@
 """Search for a critical value: where the outcome of runs changes side.  Pure: no MPI, no files, no clock.
 
-The search hands out values to try (`CriticalValue.ask`) and takes answers in any order
-(`CriticalValue.tell`).  Its final bracket depends only on the side of every value, not on how, by how many
+The search hands out values to try (`CriticalValueSearch.ask`) and takes answers in any order
+(`CriticalValueSearch.tell`).  Its final bracket depends only on the side of every value, not on how, by how many
 workers or in which order the answers were found:
 
 - Values lie on a grid, and where all runs are decided the bracket ends as two neighbors on it.
@@ -98,7 +98,7 @@ class _Near:
         return self.center + tangent
 
 
-class CriticalValue:
+class CriticalValueSearch:
     """The critical value on a grid, within limits.
 
     Parameters

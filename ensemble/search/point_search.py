@@ -14,7 +14,7 @@ from solver.scene import Scene
 
 
 @dataclass(frozen=True, kw_only=True)
-class Trial(Task):
+class SearchRun(Task):
     """A run to make, and the place in the study whose question it answers."""
 
     sweep_value: float
@@ -27,7 +27,7 @@ class _Answer:
     key: str
 
 
-class Asking(Protocol):
+class ValueSearch(Protocol):
     """Hands out values to try and takes the sides on which they lie, in any order."""
 
     def ask(self) -> float | None:
@@ -47,10 +47,10 @@ class Asking(Protocol):
         """Whether no further answer is needed."""
 
 
-SomeAsking = TypeVar("SomeAsking", bound=Asking)
+SomeValueSearch = TypeVar("SomeValueSearch", bound=ValueSearch)
 
 
-class Inquiry(Generic[SomeAsking]):
+class PointSearch(Generic[SomeValueSearch]):
     """Turns the values that are asked into tasks, and outcomes of runs into answers.
 
     Parameters
@@ -67,23 +67,23 @@ class Inquiry(Generic[SomeAsking]):
 
     def __init__(
         self,
-        asking: SomeAsking,
+        search: SomeValueSearch,
         sweep_value: float,
         scene_at: Callable[[float], Scene],
         side: Callable[[Outcome], Side],
         known: Callable[[str], Outcome | None],
     ) -> None:
-        self.asking = asking
+        self.search = search
         self.sweep_value = sweep_value
         self._scene_at = scene_at
         self._side = side
         self._known = known
         self._answers: dict[float, _Answer] = {}
-        self._pending: dict[float, Trial] = {}
+        self._pending: dict[float, SearchRun] = {}
         self.known_answers = 0
 
     @property
-    def pending(self) -> Mapping[float, Trial]:
+    def pending(self) -> Mapping[float, SearchRun]:
         """Trials that are out, by value."""
         return self._pending
 
@@ -102,13 +102,13 @@ class Inquiry(Generic[SomeAsking]):
         low, high = (None if end is None else self._answers[end].outcome for end in bracket)
         return low, high
 
-    def pointless_tasks(self) -> tuple[Trial, ...]:
+    def pointless_tasks(self) -> tuple[SearchRun, ...]:
         """Return the tasks that are out and whose outcome no longer matters."""
-        return tuple(self._pending[value] for value in sorted(self.asking.pointless()))
+        return tuple(self._pending[value] for value in sorted(self.search.pointless()))
 
-    def next_task(self) -> Trial | None:
+    def next_task(self) -> SearchRun | None:
         """Return the task of the most useful value to try; None if there is none."""
-        while (value := self.asking.ask()) is not None:
+        while (value := self.search.ask()) is not None:
             # Another study on the same store may have made this run in the meantime.
             if not self.take_known(value):
                 self._pending[value] = self._task(value)
@@ -132,20 +132,20 @@ class Inquiry(Generic[SomeAsking]):
         for task in tuple(self._pending.values()):
             self.cancelled(task)
 
-    def answer(self, task: Trial, outcome: Outcome) -> None:
+    def answer(self, task: SearchRun, outcome: Outcome) -> None:
         """Take the outcome of a task's run."""
         del self._pending[task.value]
         self._take(task, outcome)
 
-    def cancelled(self, task: Trial) -> None:
+    def cancelled(self, task: SearchRun) -> None:
         """Take back a task whose run was given up."""
         del self._pending[task.value]
-        self.asking.withdraw(task.value)
+        self.search.withdraw(task.value)
 
-    def _task(self, value: float) -> Trial:
+    def _task(self, value: float) -> SearchRun:
         scene = self._scene_at(value)
-        return Trial(sweep_value=self.sweep_value, value=value, scene=scene, key=run_key(scene))
+        return SearchRun(sweep_value=self.sweep_value, value=value, scene=scene, key=run_key(scene))
 
-    def _take(self, task: Trial, outcome: Outcome) -> None:
-        self.asking.tell(task.value, self._side(outcome))
+    def _take(self, task: SearchRun, outcome: Outcome) -> None:
+        self.search.tell(task.value, self._side(outcome))
         self._answers[task.value] = _Answer(outcome, task.key)

@@ -9,20 +9,20 @@ from functools import partial
 from ensemble.config.parameters import parameter_value
 from ensemble.config.study import Study
 from ensemble.search.boundary import Boundary, BoundaryPoint
-from ensemble.search.certification import Certification, Verdict, finer
-from ensemble.search.critical_value import CriticalValue, Status
+from ensemble.search.certification import Certification, CertificationResult, finer
+from ensemble.search.critical_value import CriticalValueSearch, Status
 from ensemble.search.grid import GeometricGrid
-from ensemble.search.point_search import Inquiry, Trial
+from ensemble.search.point_search import PointSearch, SearchRun
 from ensemble.timestamp import now
 from solver.analysis.run import Outcome
 from solver.scene import Scene
 
-_AnyInquiry = Inquiry[CriticalValue] | Inquiry[Certification]
+_AnyPointSearch = PointSearch[CriticalValueSearch] | PointSearch[Certification]
 
 ENDS = 2  # of a bracket, hence runs of a certification that finds both where they were
 
 
-class Coordinator:
+class StudyPlanner:
     """All searches of a study, the certifications of their brackets, and the tasks that are out.
 
     Searches are worked on in the order of the sweep, one task each before any gets a second one: two workers
@@ -47,50 +47,52 @@ class Coordinator:
         grid = GeometricGrid(study.search.tolerance)
         self._values = {grid.value(index) for index in grid.within(*study.search.limits)}
         self._searches = {
-            at: Inquiry(study.critical_value(), at, partial(study.scene_at, at), study.side, known)
+            at: PointSearch(study.critical_value(), at, partial(study.scene_at, at), study.side, known)
             for at in study.sweep.values
         }
-        self._certifications: dict[float, Inquiry[Certification]] = {}
+        self._certifications: dict[float, PointSearch[Certification]] = {}
         for at, value in set(filter(None, map(self._place, made))):
             self._searches[at].take_known(value)
 
-    def next_task(self) -> Trial | None:
+    def next_task(self) -> SearchRun | None:
         """Return the most useful task for an idle worker; None if every useful run is out already."""
         return next((task for task in map(self._next_of, self._by_use()) if task is not None), None)
 
-    def answer(self, task: Trial, outcome: Outcome) -> None:
+    def answer(self, task: SearchRun, outcome: Outcome) -> None:
         """Take the outcome of a task's run."""
-        self._inquiry_of(task).answer(task, outcome)
+        self._point_search_of(task).answer(task, outcome)
 
-    def cancelled(self, task: Trial) -> None:
+    def cancelled(self, task: SearchRun) -> None:
         """Take back a task whose run was given up."""
-        self._inquiry_of(task).cancelled(task)
+        self._point_search_of(task).cancelled(task)
 
-    def pointless_tasks(self) -> tuple[Trial, ...]:
+    def pointless_tasks(self) -> tuple[SearchRun, ...]:
         """Return the tasks that are out and whose outcome no longer matters."""
-        needed = list(self._inquiries())
+        needed = list(self._point_searches())
         # A late answer may have shown that there is no single critical value, hence nothing to certify.
-        overtaken = [inquiry for inquiry in self._certifications.values() if inquiry not in needed]
+        overtaken = [
+            point_search for point_search in self._certifications.values() if point_search not in needed
+        ]
         return (
-            *(task for inquiry in needed for task in inquiry.pointless_tasks()),
-            *(task for inquiry in overtaken for task in inquiry.pending.values()),
+            *(task for point_search in needed for task in point_search.pointless_tasks()),
+            *(task for point_search in overtaken for task in point_search.pending.values()),
         )
 
     @property
     def done(self) -> bool:
         """Whether no search and no certification needs any further answer."""
-        return all(inquiry.asking.done for inquiry in self._inquiries())
+        return all(point_search.search.done for point_search in self._point_searches())
 
     @property
     def known_answers(self) -> int:
         """How many answers are from runs made before."""
-        return sum(inquiry.known_answers for inquiry in self._inquiries())
+        return sum(point_search.known_answers for point_search in self._point_searches())
 
     @property
     def runs_left(self) -> float:
         """How many more answers are needed if each halves a bracket or certifies an end of one."""
-        searching = [at for at, search in self._searches.items() if not search.asking.done]
-        ends = sum(certification.asking.ends_left for certification in self._certifying())
+        searching = [at for at, search in self._searches.items() if not search.search.done]
+        ends = sum(certification.search.ends_left for certification in self._certifying())
         if self._study.search.certify:
             ends += ENDS * len(searching)
         return sum(map(self._halvings, searching)) + ends
@@ -114,7 +116,7 @@ class Coordinator:
             return None
         return (at, value) if at in self._searches and value in self._values else None
 
-    def _by_use(self) -> Iterator[_AnyInquiry]:
+    def _by_use(self) -> Iterator[_AnyPointSearch]:
         """Give all inquiries, the one whose next task is the most useful first."""
         # Sorting is stable: among equally busy searches the order of the sweep holds.
         searches = sorted(self._searches.values(), key=lambda search: len(search.pending))
@@ -124,34 +126,34 @@ class Coordinator:
         # Known answers may have ended a search on the way here.
         yield from self._certifying()
 
-    def _next_of(self, inquiry: _AnyInquiry) -> Trial | None:
-        if isinstance(inquiry.asking, CriticalValue) and inquiry.untouched:
-            guess = self._study.guess_at(inquiry.sweep_value, self._converged())
+    def _next_of(self, point_search: _AnyPointSearch) -> SearchRun | None:
+        if isinstance(point_search.search, CriticalValueSearch) and point_search.untouched:
+            guess = self._study.guess_at(point_search.sweep_value, self._converged())
             if guess is not None:
-                inquiry.asking.reseed(guess)
-        return inquiry.next_task()
+                point_search.search.reseed(guess)
+        return point_search.next_task()
 
-    def _inquiries(self) -> Iterator[_AnyInquiry]:
+    def _point_searches(self) -> Iterator[_AnyPointSearch]:
         yield from self._searches.values()
         yield from self._certifying()
 
-    def _inquiry_of(self, task: Trial) -> _AnyInquiry:
+    def _point_search_of(self, task: SearchRun) -> _AnyPointSearch:
         certification = self._certifications.get(task.sweep_value)
         if certification is not None and task in certification.pending.values():
             return certification
         return self._searches[task.sweep_value]
 
-    def _certifying(self) -> list[Inquiry[Certification]]:
+    def _certifying(self) -> list[PointSearch[Certification]]:
         every = map(self._certification, self._searches)
         return [certification for certification in every if certification is not None]
 
-    def _certification(self, at: float) -> Inquiry[Certification] | None:
+    def _certification(self, at: float) -> PointSearch[Certification] | None:
         """Return the certification of a search that has converged, beginning it if it is new."""
         bracket = self._converged_bracket(at) if self._study.search.certify else None
         if bracket is None:
             return None
         if at not in self._certifications:
-            self._certifications[at] = Inquiry(
+            self._certifications[at] = PointSearch(
                 self._study.certification(bracket),
                 at,
                 lambda value: finer(self._study.scene_at(at, value)),
@@ -166,26 +168,26 @@ class Coordinator:
         return {at: bracket for at, bracket in brackets.items() if bracket is not None}
 
     def _converged_bracket(self, at: float) -> tuple[float, float] | None:
-        search = self._searches[at].asking
+        search = self._searches[at].search
         low, high = search.bracket if search.status is Status.CONVERGED else (None, None)
         return None if low is None or high is None else (low, high)
 
     def _halvings(self, at: float) -> float:
         limits = self._study.search.limits
-        bracket = self._searches[at].asking.bracket
+        bracket = self._searches[at].search.bracket
         low, high = (end or limit for end, limit in zip(bracket, limits, strict=True))
         return max(1.0, math.log2(math.log(high / low) / math.log1p(self._study.search.tolerance)))
 
     def _point(self, at: float) -> BoundaryPoint:
         search, certification = self._searches[at], self._certification(at)
-        bracket, status, runs = search.asking.bracket, str(search.asking.status), search.runs
+        bracket, status, runs = search.search.bracket, str(search.search.status), search.runs
         outcomes, certified_by = search.outcomes(bracket), None
         if certification is not None:
-            verdict, ends = certification.asking.verdict, certification.asking.bracket
+            verdict, ends = certification.search.verdict, certification.search.bracket
             status, runs = str(verdict), runs + certification.runs
             if ends is not None:
                 bracket, outcomes = ends, certification.outcomes(ends)
-                if verdict is Verdict.CONVERGED:
+                if verdict is CertificationResult.CONVERGED:
                     certified_by = finer(self._study.scene_at(at, ends[0])).numerics
         return BoundaryPoint(
             parameters={self._study.sweep.parameter: at},

@@ -21,7 +21,7 @@ class Task:
 SomeTask = TypeVar("SomeTask", bound=Task)
 
 
-class Agenda(Protocol[SomeTask]):
+class TaskQueue(Protocol[SomeTask]):
     """Hands out tasks to idle workers and takes the outcomes of their runs, in any order."""
 
     def next_task(self) -> SomeTask | None:

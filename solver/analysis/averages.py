@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from solver.analysis.revolutions import Turns
+from solver.analysis.revolutions import RevolutionTracker
 from solver.analysis.run import Outcome, Series, Viscosity
 from solver.scene import Extension, Scene, Shear, Trap
 
@@ -31,7 +31,9 @@ def inclination(scene: Scene, series: Series) -> float | None:
     return None
 
 
-def viscosity(scene: Scene, series: Series, outcome: Outcome, turns: Turns | None) -> Viscosity | None:
+def viscosity(
+    scene: Scene, series: Series, outcome: Outcome, turns: RevolutionTracker | None
+) -> Viscosity | None:
     """As `solver.analysis.run.Viscosity` says which average it is; None while it does not exist."""
     if "viscosity_bending_tension" not in series:
         return None
@@ -57,7 +59,9 @@ def viscosity(scene: Scene, series: Series, outcome: Outcome, turns: Turns | Non
     return Viscosity(total=total, bending_tension=membrane, adhesion=adhesion, contrast=contrast)
 
 
-def _averaged_over(scene: Scene, series: Series, turns: Turns | None) -> tuple[float, float] | None:
+def _averaged_over(
+    scene: Scene, series: Series, turns: RevolutionTracker | None
+) -> tuple[float, float] | None:
     """From when to when the viscosity of a run that is not steady is averaged; None while it cannot be."""
     if turns:
         return (turns.half_turns[-3], turns.half_turns[-1]) if turns.period else None

@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 from solver import scene
 from solver.analysis.contacts import CONTACT, cluster_sizes, clusters
-from solver.analysis.line_of_centers import Orbit
+from solver.analysis.line_of_centers import LineOfCenters
 from solver.analysis.rheology import adhesion_stress, membrane_stress
 from solver.analysis.run import Frames, Series, VesicleSeries
 from solver.membrane import curve
 from solver.membrane.geometry import Geometry, Membranes
 from solver.membrane.spectral import resampled
 from solver.membrane.symmetry import independent_vesicles
-from solver.motion.dense import Dynamics, Motion
+from solver.motion.dense import DenseEquation, Motion
 from solver.motion.equation import EquationOfMotion
 from solver.potentials.proximity import gap, waist_error
 from solver.simulation.resolution import carried, resampled_angle, shape_tails
@@ -43,11 +43,11 @@ def conserved_quantities(geometry: Geometry) -> Array:
 def state_rate(membranes: Membranes, change: Array, duration: float) -> float:
     """Largest rate at which any tangent angle, or any center relative to their mean, changed.
 
-    Zero when shapes and arrangement stay: the points glide (`gliding`), so treading does not count.
+    Zero when shapes and arrangement stay: the points glide (`tangential_speed`), so treading does not count.
     """
-    turning, moving = membranes.tangent_angle(change), membranes.curve_center(change)
+    rotation_rate, moving = membranes.tangent_angle(change), membranes.curve_center(change)
     relative = moving - moving.mean(axis=0)
-    return float(max(np.abs(turning).max(), np.abs(relative).max()) / duration)
+    return float(max(np.abs(rotation_rate).max(), np.abs(relative).max()) / duration)
 
 
 def measures(setting: scene.Scene, dynamics: EquationOfMotion) -> dict[str, Measure]:
@@ -77,7 +77,7 @@ def measures(setting: scene.Scene, dynamics: EquationOfMotion) -> dict[str, Meas
         found["viscosity_bending_tension"] = lambda motion: scale * membrane_stress(motion)
         if adhesion:
             found["viscosity_adhesion"] = lambda motion: scale * adhesion_stress(motion)
-        contrast = dynamics.contrast if isinstance(dynamics, Dynamics) else None
+        contrast = dynamics.contrast if isinstance(dynamics, DenseEquation) else None
         if contrast:
             found["viscosity_contrast"] = lambda motion: (
                 scale * contrast.stress(motion.geometry, motion.velocity)
@@ -104,7 +104,7 @@ def vesicle_measures(setting: scene.Scene) -> dict[str, VesicleMeasure]:
 class Recorder:
     """Collects diagnostics and frames."""
 
-    def __init__(self, setting: scene.Scene, dynamics: EquationOfMotion, orbit: Orbit | None) -> None:
+    def __init__(self, setting: scene.Scene, dynamics: EquationOfMotion, orbit: LineOfCenters | None) -> None:
         self._setting = setting
         self._dynamics = dynamics
         self._orbit = orbit

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.analysis.revolutions import Turns, crossing
+from solver.analysis.revolutions import RevolutionTracker, crossing
 from solver.integrators import Step
 from solver.membrane.geometry import Membranes
 
@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 _FARTHER = 1.5
 
 
-class Orbit(Turns):
+class LineOfCenters(RevolutionTracker):
     """Follows the line of centers from step to step.
 
     Attributes

@@ -12,8 +12,8 @@ from typing import Protocol
 
 import numpy as np
 
-from solver.analysis.line_of_centers import Orbit
-from solver.analysis.revolutions import LongAxis
+from solver.analysis.line_of_centers import LineOfCenters
+from solver.analysis.revolutions import LongAxisTracker
 from solver.analysis.run import Outcome
 from solver.membrane import curve
 from solver.motion.equation import EquationOfMotion
@@ -30,9 +30,9 @@ class History:
 
     samples: Mapping[str, Sequence[float]]
     dynamics: EquationOfMotion
-    orbit: Orbit | None
+    orbit: LineOfCenters | None
     state: np.ndarray
-    axis: LongAxis | None = None
+    axis: LongAxisTracker | None = None
 
 
 class Criterion(Protocol):

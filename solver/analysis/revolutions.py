@@ -16,7 +16,7 @@ from solver.membrane.geometry import Membranes
 Array = NDArray[np.float64]
 
 
-class Turns(ABC):
+class RevolutionTracker(ABC):
     """Follows the angle of a line from step to step.
 
     Attributes
@@ -63,7 +63,7 @@ class Turns(ABC):
         return abs(self.angle_of(state) - self._start) - len(self.half_turns) * np.pi
 
 
-class LongAxis(Turns):
+class LongAxisTracker(RevolutionTracker):
     """The long principal axis of a single vesicle, which has no head."""
 
     ambiguity = np.pi

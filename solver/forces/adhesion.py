@@ -24,7 +24,7 @@ from solver.potentials.refinement import MAXIMUM_FACTOR, Refinement, sum_costs, 
 Array = NDArray[np.float64]
 
 
-class SharedAdhesion:
+class AdhesionBase:
     """What all kinds of adhesion have in common: a potential, and how ranks share the points it acts on.
 
     Parameters
@@ -75,8 +75,8 @@ class SharedAdhesion:
         return float(geometry.membranes.copies * self._hamaker * each.sum())
 
 
-class Adhesion(SharedAdhesion):
-    """Adhesion over all pairs of a few vesicles; see `SharedAdhesion`."""
+class Adhesion(AdhesionBase):
+    """Adhesion over all pairs of a few vesicles; see `AdhesionBase`."""
 
     def __init__(self, parameters: scene.Adhesion, accuracy: float, parallel: Parallel = SERIAL) -> None:
         super().__init__(parameters, accuracy, parallel)

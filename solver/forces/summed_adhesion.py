@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver import scene
-from solver.forces.adhesion import SharedAdhesion, gathered
+from solver.forces.adhesion import AdhesionBase, gathered
 from solver.forces.adhesion_sums import add_density, add_stiffness, summed_energy
 from solver.forces.far_adhesion import add_far_density, add_far_stiffness, far_energy, seen
 from solver.membrane.geometry import Geometry
@@ -21,8 +21,8 @@ from solver.potentials.proximity import Proximity
 Array = NDArray[np.float64]
 
 
-class SummedAdhesion(SharedAdhesion):
-    """Adhesion over all pairs of many vesicles; see `SharedAdhesion`.
+class SummedAdhesion(AdhesionBase):
+    """Adhesion over all pairs of many vesicles; see `AdhesionBase`.
 
     Attributes
     ----------

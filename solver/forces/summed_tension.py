@@ -129,9 +129,9 @@ class SummedInextensibility:
         else:
             raise TensionNotFoundError("the tension could not be found: the membranes are too distorted")
         gradient = velocity @ derivative
-        turning = (tangents[0] * gradient[1] - tangents[1] * gradient[0]) / spacing
-        velocity_x, velocity_y, turning, tension = shares.gather(
-            np.stack([*velocity, turning, tension]), axis=1
+        rotation_rate = (tangents[0] * gradient[1] - tangents[1] * gradient[0]) / spacing
+        velocity_x, velocity_y, rotation_rate, tension = shares.gather(
+            np.stack([*velocity, rotation_rate, tension]), axis=1
         )
         self._last = tension
-        return Inextensible(tension, np.stack([velocity_x, velocity_y]), turning)
+        return Inextensible(tension, np.stack([velocity_x, velocity_y]), rotation_rate)

@@ -49,7 +49,7 @@ class Inextensible(NamedTuple):
 
     tension: Array
     velocity: Array
-    turning: Array
+    rotation_rate: Array
 
 
 @compiled
@@ -67,7 +67,7 @@ def _conjugate_gradients(
     imposed: Array,
     tension: Array,
     velocity: Array,
-    turning: Array,
+    rotation_rate: Array,
 ) -> int:
     """Write what `Inextensible` holds; return the number of iterations, or −1 if ``limit`` was not enough.
 
@@ -112,7 +112,7 @@ def _conjugate_gradients(
     tension[:] = solution.reshape(count, points)
     velocity[:] = flow.reshape(imposed.shape)
     gradient = np.dot(flow.reshape(2 * count, points), derivative).reshape(imposed.shape)
-    turning[:] = wavenumber * (tangents[0] * gradient[1] - tangents[1] * gradient[0])
+    rotation_rate[:] = wavenumber * (tangents[0] * gradient[1] - tangents[1] * gradient[0])
     return iteration
 
 

@@ -39,7 +39,7 @@ class Attempt:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class StepDecision:
     """What becomes of an attempt: the size of the next one, and why this one is rejected, if it is."""
 
     size: float
@@ -52,10 +52,10 @@ class StepControl(Protocol):
     def first_size(self, acceleration: Array) -> float:
         """Size to begin with, given the second derivative of the state in time, (state_size,)."""
 
-    def judge(self, attempt: Attempt) -> Verdict:
+    def judge(self, attempt: Attempt) -> StepDecision:
         """Accept or reject a finite attempt."""
 
-    def reject(self, size: float, reason: str) -> Verdict:
+    def reject(self, size: float, reason: str) -> StepDecision:
         """Reject an attempt of this size that has no finite result."""
 
 
@@ -69,13 +69,13 @@ class FixedStep:
         """See `StepControl`."""
         return self._size
 
-    def judge(self, attempt: Attempt) -> Verdict:
+    def judge(self, attempt: Attempt) -> StepDecision:
         """See `StepControl`."""
-        return Verdict(self._size)
+        return StepDecision(self._size)
 
-    def reject(self, size: float, reason: str) -> Verdict:
+    def reject(self, size: float, reason: str) -> StepDecision:
         """See `StepControl`; no smaller step is tried."""
-        return Verdict(0.0, reason)
+        return StepDecision(0.0, reason)
 
 
 class ErrorMeasure(Protocol):
@@ -150,7 +150,7 @@ class AdaptiveStep:
         typical = root_mean_square(acceleration)
         return float(np.sqrt(2 * self._first_error / typical)) if typical > 0 else np.inf
 
-    def judge(self, attempt: Attempt) -> Verdict:
+    def judge(self, attempt: Attempt) -> StepDecision:
         """See `StepControl`."""
         excess = self._measure.excess(attempt)
         if not np.isfinite(excess):
@@ -159,12 +159,12 @@ class AdaptiveStep:
         if excess > 1:
             self._may_grow = False
             reason = f"the {self._measure.name} is {excess:.3g} times what is allowed"
-            return Verdict(attempt.size * max(factor, _SHRINK), reason)
+            return StepDecision(attempt.size * max(factor, _SHRINK), reason)
         limit = _GROW if self._may_grow else 1.0
         self._may_grow = True
-        return Verdict(attempt.size * min(max(factor, _SHRINK), limit))
+        return StepDecision(attempt.size * min(max(factor, _SHRINK), limit))
 
-    def reject(self, size: float, reason: str) -> Verdict:
+    def reject(self, size: float, reason: str) -> StepDecision:
         """See `StepControl`."""
         self._may_grow = False
-        return Verdict(size * _SHRINK, reason)
+        return StepDecision(size * _SHRINK, reason)

@@ -23,7 +23,7 @@ _CIRCLE = 1e-3**4  # η⁴: a vesicle whose curvature varies by less than a thou
 
 
 @compiled
-def gliding_direction(curvature: Array) -> Array:
+def tangential_speed_weights(curvature: Array) -> Array:
     """The linear functional of n · u_s that is the gliding speed, (M, N), for curvatures (M, N)."""
     direction = np.empty_like(curvature)
     for vesicle in range(curvature.shape[0]):
@@ -36,17 +36,17 @@ def gliding_direction(curvature: Array) -> Array:
 
 
 @compiled
-def gliding_speed(curvature: Array, turning: Array) -> Array:
+def tangential_speed(curvature: Array, rotation_rate: Array) -> Array:
     """Gliding speeds (M,) for curvatures and n · u_s, (M, N) each."""
-    return np.sum(gliding_direction(curvature) * turning, axis=1)
+    return np.sum(tangential_speed_weights(curvature) * rotation_rate, axis=1)
 
 
 @compiled
-def gliding_speed_by_curvature(curvature: Array, turning: Array) -> Array:
-    """Derivative (M, N) of each vesicle's `gliding_speed` by its curvature, at fixed n · u_s."""
+def tangential_speed_by_curvature(curvature: Array, rotation_rate: Array) -> Array:
+    """Derivative (M, N) of each vesicle's `tangential_speed` by its curvature, at fixed n · u_s."""
     derivative = np.empty_like(curvature)
     for vesicle in range(curvature.shape[0]):
-        bend, turn = curvature[vesicle], turning[vesicle]
+        bend, turn = curvature[vesicle], rotation_rate[vesicle]
         mean, mean_turn = bend.mean(), turn.mean()
         varying = bend - mean
         square = np.mean(varying * varying)
@@ -62,9 +62,9 @@ def gliding_speed_by_curvature(curvature: Array, turning: Array) -> Array:
 
 
 @compiled
-def glide(curvature: Array, turning: Array, held: Array) -> None:
+def add_tangential_motion(curvature: Array, rotation_rate: Array, held: Array) -> None:
     """Turn n · u_s (M, N) into θ_t, in place, without the modes ``held`` (N, k)."""
-    speed = gliding_speed(curvature, turning)
-    for vesicle in range(turning.shape[0]):
-        turning[vesicle] += speed[vesicle] * curvature[vesicle]
-    turning -= np.dot(np.dot(turning, held), held.T)
+    speed = tangential_speed(curvature, rotation_rate)
+    for vesicle in range(rotation_rate.shape[0]):
+        rotation_rate[vesicle] += speed[vesicle] * curvature[vesicle]
+    rotation_rate -= np.dot(np.dot(rotation_rate, held), held.T)

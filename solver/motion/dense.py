@@ -4,7 +4,7 @@ The membranes move with the fluid, u = u_∞ + S[f_bending + f_adhesion + f_tens
 tangent angle and center that reads θ_t = n · u_s and c_t = mean(u).  Where the fluid inside a vesicle has
 another viscosity than that outside, both terms of u are changed (`contrast`).
 
-`Dynamics.of` is the one place where a scene becomes the terms that it has.  What a scene does not have is
+`DenseEquation.of` is the one place where a scene becomes the terms that it has.  What a scene does not have is
 never constructed.
 """
 
@@ -25,10 +25,10 @@ from solver.membrane.geometry import Geometry, Membranes
 from solver.membrane.spectral import differentiation, highest_modes, integration
 from solver.membrane.symmetry import independent_vesicles
 from solver.membrane.tangential_velocity import (
-    glide,
-    gliding_direction,
-    gliding_speed,
-    gliding_speed_by_curvature,
+    add_tangential_motion,
+    tangential_speed,
+    tangential_speed_by_curvature,
+    tangential_speed_weights,
 )
 from solver.parallel import SERIAL, Parallel
 from solver.potentials.proximity import Closeness, Proximity
@@ -57,18 +57,18 @@ class Motion:
     geometry: Geometry
     closeness: Proximity | None
     velocity: Array
-    turning: Array
+    rotation_rate: Array
     tension: Array
     bending: Array
     adhesion: Array | None
 
 
 def state_change(motion: Motion) -> Array:
-    """How a state changes whose motion this is, (state_size,); see `Dynamics.rate`."""
-    turning = motion.turning.copy()
-    points = turning.shape[1]
-    glide(motion.geometry.curvature, turning, highest_modes(points))
-    return np.concatenate([turning.ravel(), motion.velocity.sum(axis=2).ravel() / points])
+    """How a state changes whose motion this is, (state_size,); see `DenseEquation.rate`."""
+    rotation_rate = motion.rotation_rate.copy()
+    points = rotation_rate.shape[1]
+    add_tangential_motion(motion.geometry.curvature, rotation_rate, highest_modes(points))
+    return np.concatenate([rotation_rate.ravel(), motion.velocity.sum(axis=2).ravel() / points])
 
 
 def _adhesion(
@@ -83,7 +83,7 @@ def _adhesion(
 
 
 @dataclass
-class Dynamics:
+class DenseEquation:
     """Right-hand side and Jacobian of the equation of motion.
 
     ``adhesion``, ``flow`` and ``contrast`` are None for a scene without.
@@ -132,7 +132,7 @@ class Dynamics:
         if self.contrast:
             velocity = self.contrast.velocity(velocity)
         free = self.inextensibility.solve(self.contrast or self.layer, geometry, velocity)
-        return Motion(geometry, closeness, free.velocity, free.turning, free.tension, bending, adhesion)
+        return Motion(geometry, closeness, free.velocity, free.rotation_rate, free.tension, bending, adhesion)
 
     def rate(self, state: Array) -> Array:
         """d(state)/dt.
@@ -181,8 +181,8 @@ class Dynamics:
             velocity += self.contrast.jacobian(geometry, motion.velocity)
             velocity = self.contrast.velocity(velocity)
         stretching = self.inextensibility.stretching(geometry, velocity)
-        every_point = np.arange(motion.turning.size)
-        stretching[every_point, every_point] += motion.turning.ravel()
+        every_point = np.arange(motion.rotation_rate.size)
+        stretching[every_point, every_point] += motion.rotation_rate.ravel()
         stretching *= weights
         inverse, tension_flow = self.inextensibility.factorize(self.contrast or self.layer, geometry)
         velocity += tension_flow @ (inverse @ stretching)
@@ -239,13 +239,14 @@ class Dynamics:
         gradient *= geometry.normals.reshape(2, -1, 1)
         np.sum(gradient, axis=0, out=result[: count * points])
         curvature, highest = geometry.curvature, highest_modes(points)
-        direction, gliding = gliding_direction(curvature), gliding_speed(curvature, motion.turning)
-        by_curvature = gliding_speed_by_curvature(curvature, motion.turning)
+        direction = tangential_speed_weights(curvature)
+        speed = tangential_speed(curvature, motion.rotation_rate)
+        by_curvature = tangential_speed_by_curvature(curvature, motion.rotation_rate)
         for vesicle in range(count):
             block = slice(vesicle * points, (vesicle + 1) * points)
             result[block] += np.outer(curvature[vesicle], direction[vesicle] @ result[block])
             to_curvature = self.membranes.wavenumber[vesicle] * differentiation(points)
-            result[block, block] += gliding[vesicle] * to_curvature
+            result[block, block] += speed[vesicle] * to_curvature
             result[block, block] += np.outer(curvature[vesicle], by_curvature[vesicle] @ to_curvature)
             result[block] -= highest @ (highest.T @ result[block])
         result[count * points :] = velocity.reshape(2 * count, points, -1).mean(axis=1)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from solver.motion.dense import Dynamics
-from solver.motion.summed import Suspension
+from solver.motion.dense import DenseEquation
+from solver.motion.summed import SummedEquation
 from solver.parallel import Parallel
 from solver.scene import Scene
 
-EquationOfMotion = Dynamics | Suspension
+EquationOfMotion = DenseEquation | SummedEquation
 
 
 def equation_of_motion(scene: Scene, parallel: Parallel) -> EquationOfMotion:
     """The terms of a scene, computed together by these ranks."""
-    return Suspension.of(scene, parallel) if scene.many else Dynamics.of(scene, parallel)
+    return SummedEquation.of(scene, parallel) if scene.many else DenseEquation.of(scene, parallel)

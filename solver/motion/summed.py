@@ -17,7 +17,7 @@ from solver.forces.tension import Inextensibility, TensionNotFoundError
 from solver.forces.truncated_adhesion import TruncatedAdhesion
 from solver.membrane.geometry import Geometry, Membranes
 from solver.motion.block_diagonal import BlockDiagonal
-from solver.motion.dense import Dynamics, Motion, accuracy_of, state_change
+from solver.motion.dense import DenseEquation, Motion, accuracy_of, state_change
 from solver.parallel import Parallel, Shares
 from solver.potentials.neighbors import Neighbors
 from solver.potentials.summed_single_layer import SummedSingleLayer
@@ -39,7 +39,7 @@ def _adhesion(
 
 
 @dataclass
-class Suspension:
+class SummedEquation:
     """Right-hand side of the equation of motion, and its Jacobian without what vesicles do to each other.
 
     ``adhesion`` and ``flow`` are None for a scene without.
@@ -102,11 +102,13 @@ class Suspension:
             density,
             self.flow.velocity(geometry) if self.flow else None,
         )
-        self._last = Motion(geometry, neighbors, free.velocity, free.turning, free.tension, bending, adhesion)
+        self._last = Motion(
+            geometry, neighbors, free.velocity, free.rotation_rate, free.tension, bending, adhesion
+        )
         return self._last
 
     def rate(self, state: Array) -> Array:
-        """d(state)/dt; see `Dynamics.rate`."""
+        """d(state)/dt; see `DenseEquation.rate`."""
         return state_change(self.motion(state))
 
     def rate_of(self, motion: Motion) -> Array:
@@ -126,13 +128,13 @@ class Suspension:
         own = range(count)[shares.own]
         blocks = np.empty((len(own), points + 2, points + 2))
 
-        def linearize(alone: Dynamics, geometry: Geometry, k: int) -> None:
+        def linearize(alone: DenseEquation, geometry: Geometry, k: int) -> None:
             part = slice(own[k], own[k] + 1)
             among_others = Motion(
                 geometry,
                 None,
                 motion.velocity[:, part],
-                motion.turning[part],
+                motion.rotation_rate[part],
                 motion.tension[part],
                 motion.bending[:, part],
                 None if motion.adhesion is None else motion.adhesion[:, part],
@@ -148,7 +150,7 @@ class Suspension:
         return BlockDiagonal(blocks, np.concatenate([angles, centers], axis=1), shares)
 
     def _precondition(
-        self, geometry: Geometry, shares: Shares, factorize: Callable[[Dynamics, Geometry, int], object]
+        self, geometry: Geometry, shares: Shares, factorize: Callable[[DenseEquation, Geometry, int], object]
     ) -> Preconditioner:
         """The preconditioner for the tension, after this rank's vesicles have been factorized one by one.
 
@@ -171,11 +173,11 @@ class Suspension:
             raise TensionNotFoundError(f"the tension could not be found: vesicle {vesicle} is too distorted")
         return Preconditioner(shares.gather(inverses), shares.gather(shifts)[:, None])
 
-    def _alone(self, geometry: Geometry, vesicle: int) -> tuple[Dynamics, Geometry]:
+    def _alone(self, geometry: Geometry, vesicle: int) -> tuple[DenseEquation, Geometry]:
         """A vesicle as if it were alone in the flow, its single layer assembled."""
         scene = self.scene.model_copy(update={"vesicles": (self.scene.vesicles[vesicle],), "adhesion": None})
         accuracy = accuracy_of(scene.numerics)
-        alone = replace(Dynamics.of(scene), inextensibility=Inextensibility(accuracy, 1e-3 * accuracy))
+        alone = replace(DenseEquation.of(scene), inextensibility=Inextensibility(accuracy, 1e-3 * accuracy))
         state = np.concatenate([geometry.tangent_angle[vesicle], geometry.centers[:, vesicle]])
         own = Geometry(alone.membranes, state)
         alone.layer.assemble(own, None)

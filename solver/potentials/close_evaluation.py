@@ -74,7 +74,7 @@ def _boundary_values(points: Array, tangents: Array, derivative: Array) -> tuple
     """
     n = points.shape[1]
     matrix, vector = np.empty((2, n, n)), np.empty((2, n))
-    turning = np.dot(tangents, derivative.T)
+    rotation_rate = np.dot(tangents, derivative.T)
     for i in range(n):
         for j in range(n):
             dx = points[0, i] - points[0, j]
@@ -87,7 +87,9 @@ def _boundary_values(points: Array, tangents: Array, derivative: Array) -> tuple
         for j in range(n):
             total += complex(matrix[0, i, j], matrix[1, i, j]) * complex(tangents[0, j], tangents[1, j])
         inverse_tangent = complex(tangents[0, i], -tangents[1, i])
-        value = (complex(turning[0, i], turning[1, i]) * inverse_tangent - total) * inverse_tangent
+        value = (
+            complex(rotation_rate[0, i], rotation_rate[1, i]) * inverse_tangent - total
+        ) * inverse_tangent
         vector[0, i], vector[1, i] = value.real, value.imag
     return matrix, vector
 

@@ -13,7 +13,7 @@ from solver.scene import Scene
 Array = NDArray[np.float64]
 
 
-def placed_state(scene: Scene) -> Array:
+def initial_ellipses(scene: Scene) -> Array:
     """Ellipses where the scene places them."""
     vesicles, membranes = independent_vesicles(scene), Membranes.of_scene(scene)
     tangent_angle = [
@@ -27,7 +27,7 @@ def placed_state(scene: Scene) -> Array:
     return membranes.pack(np.array(tangent_angle), np.array(center))
 
 
-def turned_state(membranes: Membranes, state: Array, tilt: float) -> Array:
+def rotated_state(membranes: Membranes, state: Array, tilt: float) -> Array:
     """Two vesicles about the origin with their line of centers along y, plus ``tilt`` radians."""
     tangent_angle, center = membranes.tangent_angle(state), membranes.center(state)
     first, second = membranes.curve_center(state)

@@ -21,7 +21,7 @@ from solver.potentials.neighbors import Neighbors
 from solver.potentials.proximity import Closeness, waist_error
 from solver.potentials.refinement import MAXIMUM_FACTOR
 from solver.scene import Scene
-from solver.simulation.initial_state import placed_state
+from solver.simulation.initial_state import initial_ellipses
 
 Array = NDArray[np.float64]
 
@@ -103,7 +103,7 @@ class AdaptiveResolution:
     def _first(self, scene: Scene) -> int:
         for points in LADDER:
             placed = with_points(scene, points)
-            membranes, state = Membranes.of_scene(placed), placed_state(placed)
+            membranes, state = Membranes.of_scene(placed), initial_ellipses(placed)
             geometry = Geometry(membranes, state)
             drawn_together = self._closest >= self._least_distance * membranes.spacing.max()
             if drawn_together and self._apart(geometry) and self._smooth(geometry, 0.0, state):

@@ -17,7 +17,7 @@ from solver.scene import Scene
 Array = NDArray[np.float64]
 
 
-class Cost(NamedTuple):
+class SegmentWork(NamedTuple):
     """What a run has cost so far."""
 
     evaluations: int = 0
@@ -26,7 +26,7 @@ class Cost(NamedTuple):
     tension_iterations: int = 0
 
 
-class Stage:
+class Segment:
     """The part of a run that has one number of points.
 
     Parameters
@@ -39,7 +39,7 @@ class Stage:
         The ranks that compute it together.
     """
 
-    def __init__(self, scene: Scene, before: Cost, parallel: Parallel) -> None:
+    def __init__(self, scene: Scene, before: SegmentWork, parallel: Parallel) -> None:
         self.dynamics = equation_of_motion(scene, parallel)
         self._scene = scene
         self._before = before
@@ -70,10 +70,10 @@ class Stage:
         return self._integrator.step()
 
     @property
-    def cost(self) -> Cost:
+    def cost(self) -> SegmentWork:
         """What the run has cost up to now."""
         integrator = self._integrator
-        return Cost(
+        return SegmentWork(
             self._before.evaluations + self.dynamics.evaluations,
             self._before.jacobians + (integrator.jacobian_evaluations if integrator else 0),
             self._before.factorizations + (integrator.factorizations if integrator else 0),

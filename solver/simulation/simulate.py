@@ -11,18 +11,18 @@ from numpy.typing import NDArray
 
 from solver.analysis import averages
 from solver.analysis.diagnostics import Recorder
-from solver.analysis.line_of_centers import Orbit
+from solver.analysis.line_of_centers import LineOfCenters
 from solver.analysis.outcome import History, criteria_of, latest_time, may_tumble
-from solver.analysis.revolutions import LongAxis, Turns
+from solver.analysis.revolutions import LongAxisTracker, RevolutionTracker
 from solver.analysis.run import LARGEST_SPATIAL, Energy, Errors, Outcome, Run, Work
 from solver.forces.tension import TensionNotFoundError
 from solver.integrators import StepFailedError
 from solver.membrane.geometry import Membranes
 from solver.parallel import SERIAL, Parallel, first_rank_asks, require_agreement
 from solver.scene import Scene, Shear, Start
-from solver.simulation.initial_state import placed_state, turned_state
+from solver.simulation.initial_state import initial_ellipses, rotated_state
 from solver.simulation.resolution import UnresolvedError, carried, resolution_of, with_points
-from solver.simulation.segment import Cost, Stage
+from solver.simulation.segment import Segment, SegmentWork
 
 Array = NDArray[np.float64]
 
@@ -74,12 +74,12 @@ def simulate(
     start = _start(scene, resolution.points, parallel, should_stop)
     should_stop = first_rank_asks(parallel, should_stop)
     latest = latest_time(scene)
-    stage = Stage(with_points(scene, start.points), Cost(), parallel)
+    stage = Segment(with_points(scene, start.points), SegmentWork(), parallel)
     orbit = None
     if len(scene.vesicles) == 2:
-        orbit = Orbit(stage.membranes, start.state, scene.criteria.separated_distance)
-    axis = LongAxis(stage.membranes, start.state) if may_tumble(scene) else None
-    turns: Turns | None = orbit or axis
+        orbit = LineOfCenters(stage.membranes, start.state, scene.criteria.separated_distance)
+    axis = LongAxisTracker(stage.membranes, start.state) if may_tumble(scene) else None
+    turns: RevolutionTracker | None = orbit or axis
     recorder = Recorder(scene, stage.dynamics, orbit)
     criteria = criteria_of(scene)
     progress = _Progress(0.0, start.state)
@@ -94,7 +94,7 @@ def simulate(
             require_agreement(parallel, step.end)
             points = resolution.finer(stage.membranes, step.end, step.state)
             if points is not None:
-                coarse, stage = stage.membranes, Stage(with_points(scene, points), stage.cost, parallel)
+                coarse, stage = stage.membranes, Segment(with_points(scene, points), stage.cost, parallel)
                 progress.state = carried(coarse, progress.state, stage.membranes)
                 progress.rejected += 1
                 recorder.continue_with(stage.dynamics)
@@ -153,7 +153,7 @@ class _Start:
 
 def _start(scene: Scene, points: int, parallel: Parallel, should_stop: Callable[[], bool] | None) -> _Start:
     """Where a run begins that needs these points for the vesicles as they are placed."""
-    placed = placed_state(with_points(scene, points))
+    placed = initial_ellipses(with_points(scene, points))
     if not scene.start.relaxed:
         return _Start(points, placed)
     at_rest = scene.model_copy(update={"flow": None, "start": Start(), "horizon": scene.start.horizon})
@@ -167,7 +167,7 @@ def _start(scene: Scene, points: int, parallel: Parallel, should_stop: Callable[
     membranes = Membranes.of_scene(with_points(scene, points))
     computed = slice(membranes.count)  # the others are images
     last = membranes.pack(frames.tangent_angle[-1, computed], frames.center[-1, computed])
-    turned = turned_state(membranes, last, scene.start.tilt)
+    turned = rotated_state(membranes, last, scene.start.tilt)
     return _Start(points, turned, relaxed.work.rhs_evaluations)
 
 
@@ -185,7 +185,7 @@ def _summary(
     outcome: Outcome,
     failure: str | None,
     progress: _Progress,
-    turns: Turns | None,
+    turns: RevolutionTracker | None,
     recorder: Recorder,
     work: Work,
 ) -> Run:

@@ -30,7 +30,7 @@ parameters = {{ "path.key" = "{boundary}" }}
 
 
 @dataclass(frozen=True)
-class Verdict:
+class RequestVerdict:
     """How many requests were made, and what schemathesis says of the answers."""
 
     cases: int
@@ -38,7 +38,7 @@ class Verdict:
     text: str
 
 
-def try_everything(directory: Path, *options: str, seconds: float) -> Verdict:
+def try_everything(directory: Path, *options: str, seconds: float) -> RequestVerdict:
     """Serve a filled store and send what schemathesis makes up.
 
     Parameters
@@ -74,4 +74,4 @@ def try_everything(directory: Path, *options: str, seconds: float) -> Verdict:
             check=False,
         )
     counted = re.search(r"(\d+) generated", done.stdout)
-    return Verdict(int(counted[1]) if counted else 0, done.returncode == 0, done.stdout + done.stderr)
+    return RequestVerdict(int(counted[1]) if counted else 0, done.returncode == 0, done.stdout + done.stderr)

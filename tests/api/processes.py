@@ -50,7 +50,7 @@ class Family:
     def __init__(self, store: Path, *options: str) -> None:
         self._mark = uuid4().hex
         self.worker = subprocess.Popen(
-            [sys.executable, "-m", "ensemble.cli.main", "worker", "--store", str(store), *options],
+            [sys.executable, "-m", "ensemble", "worker", "--store", str(store), *options],
             env=os.environ | {MARK: self._mark},
             stdin=subprocess.PIPE,
         )

@@ -28,7 +28,7 @@ class Started:
 
 def start_service(store: Path, log: Path, port: int = 0, workers: int = 1) -> Started:
     """Run `ensemble serve`, and return when it answers."""
-    command = [sys.executable, "-m", "ensemble.cli.main", "serve", "--store", str(store)]
+    command = [sys.executable, "-m", "ensemble", "serve", "--store", str(store)]
     with log.open("w") as output:
         process = subprocess.Popen(
             [*command, "--port", str(port), "--workers", str(workers)], stderr=output, text=True

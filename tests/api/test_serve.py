@@ -21,7 +21,7 @@ import pytest
 from api.auth.scope import Scope
 from tests.api.servers import make_token
 
-SERVE = (sys.executable, "-m", "ensemble.cli.main", "serve")
+SERVE = (sys.executable, "-m", "ensemble", "serve")
 SECONDS = 60
 SECONDS_TO_DIE = 5
 

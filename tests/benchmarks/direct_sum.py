@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from ensemble.config.study import load_scene
-from solver.motion.dense import Dynamics
+from solver.motion.dense import DenseEquation
 from solver.potentials.direct_sum import velocity
 from solver.simulation.simulate import simulate
 
@@ -124,13 +124,13 @@ def direct_sums() -> dict[str, dict[str, float]]:
 
 
 def evaluation(points: int) -> dict[str, float]:
-    """Time of `Dynamics.rate` for a tumbling doublet, and of the baseline for as many pairs of points.
+    """Time of `DenseEquation.rate` for a tumbling doublet, and of the baseline for as many pairs of points.
 
     The preconditioner for the tension is from one time unit earlier, as it may be in a run.
     """
     scene = load_scene("doublet-shear", [f"numerics.points={points}", "horizon=20"])
     frames = simulate(scene).frames
-    dynamics = Dynamics.of(scene)
+    dynamics = DenseEquation.of(scene)
     membranes = dynamics.membranes
     earlier, state = (
         membranes.pack(frames.tangent_angle[k, : membranes.count], frames.center[k, : membranes.count])

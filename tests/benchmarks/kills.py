@@ -51,7 +51,7 @@ class Service:
         self._command = [
             sys.executable,
             "-m",
-            "ensemble.cli.main",
+            "ensemble",
             "serve",
             f"--port={port}",
             f"--store={store}",
@@ -96,7 +96,7 @@ def _plays(process: psutil.Process, part: str) -> bool:
     if part == "mpirun":
         return process.name().startswith("mpi")
     words = [word for word in command if word != "-P"]
-    return words[1:4] == ["-m", "ensemble.cli.main", {"server": "serve", "worker": "worker"}[part]]
+    return words[1:4] == ["-m", "ensemble", {"server": "serve", "worker": "worker"}[part]]
 
 
 class Load:

@@ -79,7 +79,7 @@ def fill_queue(store: Path, count: int) -> list[str]:
 def server(store: Path, workers: int) -> Iterator[tuple[psutil.Process, str]]:
     """Start a server process; gives it and its address."""
     said = store.with_name("said")
-    command = [sys.executable, "-m", "ensemble.cli.main", "serve", "--port=0", f"--workers={workers}"]
+    command = [sys.executable, "-m", "ensemble", "serve", "--port=0", f"--workers={workers}"]
     with said.open("wb") as log:
         process = subprocess.Popen(
             [*command, f"--store={store}"], stdout=log, stderr=log, env=os.environ | UNLIMITED

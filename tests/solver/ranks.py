@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from ensemble.mpi.world import abort_guard, world
 from solver.analysis.run import Run
-from solver.motion.dense import Dynamics
-from solver.motion.summed import Suspension
+from solver.motion.dense import DenseEquation
+from solver.motion.summed import SummedEquation
 from solver.parallel import SERIAL, Parallel, Ranks
 from solver.scene import LARGEST_DENSE, Adhesion, Numerics, Scene, Shear, Trap, Vesicle
-from solver.simulation.initial_state import placed_state
+from solver.simulation.initial_state import initial_ellipses
 from solver.simulation.simulate import simulate
 from tests.solver.scenes import shear_pair, uneven_pair
 from tests.solver.suspensions import suspension
@@ -38,14 +38,14 @@ DOUBLET = shear_pair(3.5, numerics=Numerics(points=32, tolerance=1e-3))
 
 def linearized(scene: Scene, parallel: Parallel) -> tuple[Array, Array]:
     """Right-hand side and Jacobian where a scene begins."""
-    dynamics, state = Dynamics.of(scene, parallel), placed_state(scene)
+    dynamics, state = DenseEquation.of(scene, parallel), initial_ellipses(scene)
     return dynamics.rate(state), dynamics.jacobian(state)
 
 
 def summed(scene: Scene, parallel: Parallel) -> tuple[Array, Array]:
     """Right-hand side and energy of adhesion of many vesicles where a scene begins."""
-    sums = Suspension.of(scene, parallel)
-    motion = sums.motion(placed_state(scene))
+    sums = SummedEquation.of(scene, parallel)
+    motion = sums.motion(initial_ellipses(scene))
     assert sums.adhesion
     assert motion.closeness
     return sums.rate_of(motion), np.array([sums.adhesion.energy(motion.geometry, motion.closeness)])

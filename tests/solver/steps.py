@@ -12,9 +12,9 @@ from scipy.integrate import solve_ivp
 from solver.integrators import BackwardDifferentiation, Integrator, Step
 from solver.integrators.control import FixedStep, root_mean_square
 from solver.integrators.one_step import OneStepIntegrator, OneStepMethod
-from solver.motion.dense import Dynamics
+from solver.motion.dense import DenseEquation
 from solver.scene import Numerics
-from solver.simulation.initial_state import placed_state
+from solver.simulation.initial_state import initial_ellipses
 from tests.solver.scenes import shear_pair
 
 Array = NDArray[np.float64]
@@ -75,11 +75,13 @@ def oscillator_errors(
 
 
 @cache
-def sheared_pair(begin: float) -> tuple[Dynamics, Array, float]:
+def sheared_pair(begin: float) -> tuple[DenseEquation, Array, float]:
     """Adhering vesicles that have been in shear for some time, and the rate of their fastest mode."""
     scene = shear_pair(1.5, numerics=Numerics(points=32, tolerance=1e-9))
-    dynamics = Dynamics.of(scene)
-    integrator = BackwardDifferentiation(dynamics.rate, dynamics.jacobian, placed_state(scene), 1e-8, begin)
+    dynamics = DenseEquation.of(scene)
+    integrator = BackwardDifferentiation(
+        dynamics.rate, dynamics.jacobian, initial_ellipses(scene), 1e-8, begin
+    )
     state = all_steps(integrator, begin)[-1].state
     return dynamics, state, float(-np.linalg.eigvals(dynamics.jacobian(state)).real.min())
 

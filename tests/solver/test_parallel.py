@@ -128,13 +128,13 @@ import numpy as np
 from ensemble.mpi.world import abort_guard, world
 from solver.motion.equation import equation_of_motion
 from solver.parallel import Ranks
-from solver.simulation.initial_state import placed_state
+from solver.simulation.initial_state import initial_ellipses
 from solver.forces.tension import TensionNotFoundError
 from tests.solver.suspensions import suspension
 communicator = world()
 with abort_guard(communicator):
     scene = suspension(7, 32)
-    state = placed_state(scene)
+    state = initial_ellipses(scene)
     state[6 * 32 : 7 * 32] += 10 * np.random.default_rng(1).standard_normal(32)
     equation = equation_of_motion(scene, Ranks(communicator))
     try:

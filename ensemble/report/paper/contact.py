@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.analysis.run import Array, Run
-from solver.motion.dense import Dynamics
+from solver.motion.dense import DenseEquation
 from solver.simulation.resolution import with_points
 
 
@@ -66,7 +66,7 @@ def contact_of(run: Run) -> Contact:
     """
     frames = run.frames
     points = frames.tangent_angle.shape[-1]
-    dynamics = Dynamics.of(with_points(run.scene, points))
+    dynamics = DenseEquation.of(with_points(run.scene, points))
     membranes = dynamics.membranes
     computed = slice(membranes.count)  # the others are images
     motion = dynamics.motion(membranes.pack(frames.tangent_angle[-1, computed], frames.center[-1, computed]))

@@ -16,7 +16,7 @@ from ensemble.report.paper.boundary_figures import draw_brackets
 from ensemble.report.paper.case import StudyCase
 from ensemble.report.paper.comparison import Bracket, Row, bracket, number
 from ensemble.report.paper.results import Results
-from ensemble.report.paper.section import Chapter, Course, Drawing, Plan, Section
+from ensemble.report.paper.section import Chapter, Course, Drawing, Section, SectionPlan
 from solver.scene.ellipses import semi_axes
 
 _CONTRAST: Final = quantity("vesicles.viscosity_contrast", "shear")
@@ -40,7 +40,7 @@ def keller_skalak(reduced_area: float) -> float:
 def _course(quick: bool) -> Course:
     treading = StudyCase.of("critical-viscosity-contrast", _QUICK_TREADING if quick else {})
     adhesion = StudyCase.of("critical-hamaker-contrast", _QUICK_ADHESION if quick else {})
-    results = yield Plan([], [treading, adhesion])
+    results = yield SectionPlan([], [treading, adhesion])
     drawing = _figure(results.brackets(treading), results.brackets(adhesion))
     return Chapter(
         [

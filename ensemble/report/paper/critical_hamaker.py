@@ -17,7 +17,7 @@ from ensemble.report.paper.comparison import Bracket, Row, bracket, number, word
 from ensemble.report.paper.power_laws import Line, straight_line
 from ensemble.report.paper.published import published
 from ensemble.report.paper.results import Results
-from ensemble.report.paper.section import Chapter, Course, Drawing, Plan, Section
+from ensemble.report.paper.section import Chapter, Course, Drawing, Section, SectionPlan
 from ensemble.report.paper.shear_doublet import Doublet
 from solver.analysis.run import Outcome, Run
 from solver.scene import Scene
@@ -74,7 +74,9 @@ def _course(quick: bool) -> Course:
     tables = [table for table in _published() if not quick or table.distance in tuple(_PRESETS)[:1]]
     studies = {table.distance: _study(table.distance, quick) for table in tables}
     seen = [end for table in tables for end in table.ends()]
-    results = yield Plan([doublet.until_published_horizon for doublet, _ in seen], list(studies.values()))
+    results = yield SectionPlan(
+        [doublet.until_published_horizon for doublet, _ in seen], list(studies.values())
+    )
     content: list[str | list[Row] | Drawing] = [_INTRODUCTION]
     diagrams = [_diagram(results, table, studies[table.distance]) for table in tables]
     content.append(

@@ -15,7 +15,7 @@ from ensemble.report.paper.contact import Contact, contact_of
 from ensemble.report.paper.power_laws import power_law
 from ensemble.report.paper.published import published
 from ensemble.report.paper.results import Results
-from ensemble.report.paper.section import Chapter, Course, Drawing, Plan, Section
+from ensemble.report.paper.section import Chapter, Course, Drawing, Section, SectionPlan
 
 _HAMAKER, _DISTANCE = 5.0, 0.2  # those of the published doublets
 _SHOWN = (0.6, 0.75, 0.95)  # reduced areas of the published shapes
@@ -74,7 +74,7 @@ def _course(quick: bool) -> Course:
         for distance in distances
     }
     swept = [case for cases in (*by_area.values(), *by_hamaker.values()) for case in cases.values()]
-    results = yield Plan([*shapes, *settings, *swept])
+    results = yield SectionPlan([*shapes, *settings, *swept])
 
     runs = {case: results.run(case) for case in shapes if not results.failed(case)}
     contacts = {case: contact_of(run) for case, run in runs.items()}

@@ -16,7 +16,7 @@ from ensemble.report.paper.case import Case
 from ensemble.report.paper.comparison import Row, number
 from ensemble.report.paper.power_laws import PowerLaw, power_law
 from ensemble.report.paper.published import published
-from ensemble.report.paper.section import Chapter, Course, Drawing, Plan, Section
+from ensemble.report.paper.section import Chapter, Course, Drawing, Section, SectionPlan
 from solver.analysis.run import Run
 
 _HAMAKER, _DISTANCE = 0.1, 0.4  # where the other of the two is varied
@@ -85,7 +85,7 @@ def _by_hamaker(setting: _Setting) -> list[_Pair]:
 def _course(quick: bool) -> Course:
     settings = _SETTINGS[:1] if quick else _SETTINGS
     pairs = [pair for setting in settings for pair in (*_by_distance(setting), *_by_hamaker(setting))]
-    results = yield Plan([pair.case for pair in pairs])
+    results = yield SectionPlan([pair.case for pair in pairs])
     runs = {pair: results.run(pair.case) for pair in pairs if not results.failed(pair.case)}
     times = {pair: draining_time(run) for pair, run in runs.items()}
     content: list[str | list[Row] | Drawing] = [_INTRODUCTION]

@@ -12,7 +12,7 @@ from ensemble.figures.style import BLUE, GREEN, STYLE, VERMILLION, WIDTH
 from ensemble.report.paper.case import Case
 from ensemble.report.paper.comparison import Row, number, words
 from ensemble.report.paper.results import Results
-from ensemble.report.paper.section import Chapter, Course, Drawing, Plan, Section
+from ensemble.report.paper.section import Chapter, Course, Drawing, Section, SectionPlan
 from ensemble.store.run_record import RunSummary
 from solver.analysis.run import Outcome
 
@@ -75,7 +75,7 @@ def _course(quick: bool) -> Course:
         for preset in _PRESETS
         for potential in (_REFERENCE, *_OTHERS)
     }
-    results = yield Plan(list(cases.values()))
+    results = yield SectionPlan(list(cases.values()))
     rows = [row for preset in _PRESETS for row in _rows(results, preset)]
     return Chapter(
         [

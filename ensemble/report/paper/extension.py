@@ -14,7 +14,7 @@ from ensemble.report.paper.case import Case, StudyCase
 from ensemble.report.paper.comparison import Row, bracket, number, words
 from ensemble.report.paper.filmstrip import filmstrip
 from ensemble.report.paper.results import Results
-from ensemble.report.paper.section import Chapter, Course, Drawing, Plan, Section
+from ensemble.report.paper.section import Chapter, Course, Drawing, Section, SectionPlan
 from solver.analysis.run import Run
 
 
@@ -83,9 +83,9 @@ def _course(quick: bool) -> Course:
     )
     as_published = _MEETINGS[-1].case().but(_PUBLISHED_NUMERICS)
     if quick:
-        results = yield Plan([*meetings, *trapped], [study])
+        results = yield SectionPlan([*meetings, *trapped], [study])
     else:
-        results = yield Plan([*meetings, *trapped, as_published], [study, by_area])
+        results = yield SectionPlan([*meetings, *trapped, as_published], [study, by_area])
     runs = {meeting: results.run(meeting.case()) for meeting in _MEETINGS}
     held = {meeting: results.run(meeting.case("trap")) for meeting in _MEETINGS}
     titles = {

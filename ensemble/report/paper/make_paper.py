@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 
 from matplotlib.figure import Figure as Drawn
 
-from ensemble.cli.progress import standing_text
-from ensemble.mpi.run_study import Snapshot, run_batch, trace
+from ensemble.cli.progress import progress_text
+from ensemble.mpi.run_study import Snapshot, run_batch, run_study
 from ensemble.report import ReportName
 from ensemble.report.files import Report, report_directory, write_report
 from ensemble.report.machine import Machine
 from ensemble.report.paper.paper_document import Figure, Paper, Part
 from ensemble.report.paper.paper_text import paper_page, paper_text
 from ensemble.report.paper.results import Results
-from ensemble.report.paper.section import Chapter, Drawing, Plan, Section
+from ensemble.report.paper.section import Chapter, Drawing, Section, SectionPlan
 from ensemble.report.report_progress import Tell
 from ensemble.store import Store
 
@@ -95,7 +95,7 @@ class _Courses:
         self._plans = {name: next(course) for name, course in self._going.items()}
         self.chapters: dict[str, Chapter] = {}
 
-    def next_plan(self) -> Plan | None:
+    def next_plan(self) -> SectionPlan | None:
         """What all sections need next, once what they needed before is there; None when all are finished."""
         if not self._going:
             return None
@@ -109,27 +109,29 @@ class _Courses:
                     del self._going[name]
         cases = {case.key: case for plan in plans.values() for case in plan.cases}
         studies = {case.study.key: case for plan in plans.values() for case in plan.studies}
-        return Plan(tuple(cases.values()), tuple(studies.values())) if plans else None
+        return SectionPlan(tuple(cases.values()), tuple(studies.values())) if plans else None
 
 
-def _carry_out(communicator: Intracomm, plan: Plan, store: Store, tell: Tell, ranks_per_run: int) -> int:
+def _carry_out(
+    communicator: Intracomm, plan: SectionPlan, store: Store, tell: Tell, ranks_per_run: int
+) -> int:
     """Make the runs of a plan on all ranks, and say how many."""
     cost = run_batch(
         communicator,
         [case.scene for case in plan.cases],
         store,
-        lambda standing: tell(f"runs: {standing_text(standing)}"),
+        lambda progress: tell(f"runs: {progress_text(progress)}"),
         ranks_per_run,
     )
     runs = cost.runs
     for case in plan.studies:
         telling = _telling(case.study.name, tell)
-        runs += trace(communicator, case.study, store, telling, ranks_per_run).cost.runs
+        runs += run_study(communicator, case.study, store, telling, ranks_per_run).cost.runs
     return runs
 
 
 def _telling(name: str, tell: Tell) -> Callable[[Snapshot], None]:
-    return lambda snapshot: tell(f"{name}: {standing_text(snapshot.standing)}")
+    return lambda snapshot: tell(f"{name}: {progress_text(snapshot.progress)}")
 
 
 def _part(section: Section, chapter: Chapter) -> tuple[Part, dict[str, Drawn]]:

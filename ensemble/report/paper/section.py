@@ -13,7 +13,7 @@ from ensemble.report.paper.results import Results
 
 
 @dataclass(frozen=True)
-class Plan:
+class SectionPlan:
     """Runs and boundaries that a section needs next."""
 
     cases: Sequence[Case] = ()
@@ -40,7 +40,7 @@ class Chapter:
     content: Sequence[str | Sequence[Row] | Drawing]
 
 
-Course = Generator[Plan, Results, Chapter]
+Course = Generator[SectionPlan, Results, Chapter]
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from ensemble.report.paper.comparison import Row, number, words
 from ensemble.report.paper.filmstrip import filmstrip
 from ensemble.report.paper.published import published
 from ensemble.report.paper.results import Results
-from ensemble.report.paper.section import Chapter, Course, Drawing, Plan, Section
+from ensemble.report.paper.section import Chapter, Course, Drawing, Section, SectionPlan
 from ensemble.report.paper.shear_doublet import Doublet, period
 from ensemble.report.paper.shear_figures import Curve
 from solver.analysis.run import Run
@@ -59,7 +59,7 @@ def _course(quick: bool) -> Course:
     colliding = [Doublet(hamaker) for hamaker in (_HAMAKERS[1::3] if quick else _HAMAKERS)]
     doublets = list(dict.fromkeys([*doublets, *shown, *colliding]))
     resonant = {} if quick else {at: [_of_area(*at, area) for area in _AREAS] for at in _RESONANT}
-    results = yield Plan(
+    results = yield SectionPlan(
         [*(doublet.case for doublet in doublets), *(case for cases in resonant.values() for case in cases)]
     )
     periods = {doublet: value for doublet in sorted(doublets) if (value := period(results, doublet))}

@@ -10,7 +10,7 @@ from ensemble.report.paper.comparison import Row, bracket, number
 from ensemble.report.paper.filmstrip import filmstrip
 from ensemble.report.paper.published import published
 from ensemble.report.paper.results import Results
-from ensemble.report.paper.section import Chapter, Course, Drawing, Plan, Section
+from ensemble.report.paper.section import Chapter, Course, Drawing, Section, SectionPlan
 
 _SHOWN = (
     (0.7, 0.02),
@@ -50,7 +50,7 @@ def _course(quick: bool) -> Course:
         }
         | coarse,
     )
-    results = yield Plan([*shown, *turning, *grid.values()], [*studies.values(), actual])
+    results = yield SectionPlan([*shown, *turning, *grid.values()], [*studies.values(), actual])
     first, second = studies.values()
     films = {
         rf"$\Delta A$ = {area:g}, $\dot\epsilon$ = {rate:g}": results.run(case)

@@ -17,7 +17,7 @@ from ensemble.report.paper.boundary_figures import draw_brackets
 from ensemble.report.paper.case import Case, StudyCase
 from ensemble.report.paper.comparison import Row, bracket, words
 from ensemble.report.paper.results import Results
-from ensemble.report.paper.section import Chapter, Course, Drawing, Plan, Section
+from ensemble.report.paper.section import Chapter, Course, Drawing, Section, SectionPlan
 from solver.analysis.run import Run
 
 _BY_AREA = "critical-hamaker-reduced-area"
@@ -72,7 +72,7 @@ def _course(quick: bool) -> Course:
     by_area = StudyCase.of(_BY_AREA, _QUICK if quick else {})
     shapes = dict(list(_at_rest().items())[:1]) if quick else _at_rest()
     studies = {} if quick else _in_shear()
-    results = yield Plan(list(shapes.values()), [by_area, *studies.values()])
+    results = yield SectionPlan(list(shapes.values()), [by_area, *studies.values()])
     runs = {name: results.run(case) for name, case in shapes.items() if not results.failed(case)}
     return Chapter(
         [

@@ -14,7 +14,7 @@ from ensemble.report.paper.case import Case
 from ensemble.report.paper.comparison import Row, number
 from ensemble.report.paper.published import published
 from ensemble.report.paper.results import Results
-from ensemble.report.paper.section import Chapter, Course, Drawing, Plan, Section
+from ensemble.report.paper.section import Chapter, Course, Drawing, Section, SectionPlan
 from ensemble.report.paper.shear_doublet import published_vesicles
 
 _HAMAKER, _STRONG = 0.7, 2.1
@@ -54,7 +54,7 @@ def _course(quick: bool) -> Course:
         "0.9": _doublet(0.9, _STRONG),
         "published vesicles": _doublet(0.9, _STRONG).but(published_vesicles()),
     }
-    results = yield Plan([*singles.values(), *doublets.values(), *strong.values()])
+    results = yield SectionPlan([*singles.values(), *doublets.values(), *strong.values()])
     rows = [
         _row(results, f"single vesicle, reduced area {area:g}", value, singles[area], "total")
         for area, value in published()["viscosity"]["single"]

@@ -23,7 +23,7 @@ from ensemble.report.scaling.model_fit import (
 )
 from ensemble.report.scaling.scaling_document import Collective, Cost, Evaluation, Scaling, Weak
 from ensemble.report.scaling.scaling_figures import scaling_figures
-from ensemble.report.scaling.scaling_plan import FULL, POINTS, QUICK, Plan
+from ensemble.report.scaling.scaling_plan import FULL, POINTS, QUICK, ScalingPlan
 from ensemble.report.scaling.scaling_text import scaling_text
 from ensemble.store import Store
 from solver.scene import LARGEST_DENSE
@@ -64,7 +64,7 @@ def make_scaling(communicator: Intracomm, store: Store, quick: bool, tell: Tell)
     return report
 
 
-def measured(communicator: Intracomm, plan: Plan, tell: Tell) -> Scaling | None:
+def measured(communicator: Intracomm, plan: ScalingPlan, tell: Tell) -> Scaling | None:
     """Measure everything and fit the model; None on all ranks but the first.  Collective."""
     say = tell if communicator.Get_rank() == 0 else _say_nothing
     sizes = _sizes(communicator.Get_size())
@@ -115,7 +115,7 @@ def _sizes(ranks: int) -> list[int]:
     return sorted({2**power for power in range(ranks.bit_length())} | {ranks})
 
 
-def _costs(communicator: Intracomm, plan: Plan, say: Tell) -> list[Cost]:
+def _costs(communicator: Intracomm, plan: ScalingPlan, say: Tell) -> list[Cost]:
     found = []
     for vesicles in plan.alone:
         say(f"{vesicles} vesicles alone")
@@ -158,7 +158,7 @@ def _shared(
     ]
 
 
-def _weak(communicator: Intracomm, plan: Plan, sizes: list[int], say: Tell) -> list[Weak]:
+def _weak(communicator: Intracomm, plan: ScalingPlan, sizes: list[int], say: Tell) -> list[Weak]:
     found: list[Weak] = []
     for ranks in sizes:
         vesicles = round(plan.weak * math.sqrt(ranks))

@@ -17,7 +17,7 @@ from ensemble.report.scaling.scaling_plan import suspension
 from solver.motion.equation import equation_of_motion
 from solver.parallel import SERIAL, Array, Ranks
 from solver.potentials.direct_sum import velocity
-from solver.simulation.initial_state import placed_state
+from solver.simulation.initial_state import initial_ellipses
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
@@ -59,7 +59,7 @@ def _evaluation(group: Intracomm, vesicles: int, repeats: int) -> Measured:
     scene = suspension(vesicles)
     parallel = Counted(Ranks(group) if group.Get_size() > 1 else SERIAL)
     dynamics = equation_of_motion(scene, parallel)
-    state = placed_state(scene)
+    state = initial_ellipses(scene)
     rate = dynamics.rate(state)
     shear = np.zeros_like(state)
     membranes, flow = dynamics.membranes, scene.flow

@@ -11,7 +11,7 @@ POINTS = 64  # on each vesicle
 
 
 @dataclass(frozen=True)
-class Plan:
+class ScalingPlan:
     """Numbers of vesicles, and how often each evaluation is repeated.
 
     shared : by all numbers of ranks.
@@ -25,8 +25,10 @@ class Plan:
     repeats: int
 
 
-QUICK = Plan(shared=(2, 16, 64), alone=(2, 8, 16, 32, 64, 128), weak=32, repeats=6)
-FULL = Plan(shared=(2, 16, 64, 256), alone=(2, 8, 16, 32, 64, 128, 256, 512, 1024), weak=64, repeats=12)
+QUICK = ScalingPlan(shared=(2, 16, 64), alone=(2, 8, 16, 32, 64, 128), weak=32, repeats=6)
+FULL = ScalingPlan(
+    shared=(2, 16, 64, 256), alone=(2, 8, 16, 32, 64, 128, 256, 512, 1024), weak=64, repeats=12
+)
 
 
 def suspension(vesicles: int) -> Scene:

@@ -17,7 +17,7 @@ from api.jobs.job import Job, Kind, Status, Work, preset_work
 from api.jobs.job_queue import Jobs
 from api.settings import Settings
 from api.worker.background import NICENESS
-from api.worker.worker import MAXIMUM_ATTEMPTS, Verdict, verdict
+from api.worker.worker import MAXIMUM_ATTEMPTS, JobResult, job_result
 from ensemble.store import Store
 from tests.api.accepting import accepted
 from tests.api.processes import Family, alive, wait_until, working
@@ -219,23 +219,23 @@ def test_a_job_that_is_always_cut_short_is_given_up(jobs, store):
 @pytest.mark.parametrize(
     ("kind", "status", "output", "last_words", "expected"),
     [
-        (Kind.SCENE, 2, "", "ensemble: flow.rate: no", Verdict(Status.FAILED, "ensemble: flow.rate: no")),
-        (Kind.SCENE, 1, "", "", Verdict(Status.FAILED, "ended with status 1")),
+        (Kind.SCENE, 2, "", "ensemble: flow.rate: no", JobResult(Status.FAILED, "ensemble: flow.rate: no")),
+        (Kind.SCENE, 1, "", "", JobResult(Status.FAILED, "ended with status 1")),
         (
             Kind.SCENE,
             1,
             json.dumps({"outcome": "failed", "failure": "underflow"}),
             "warning",
-            Verdict(Status.FAILED, "underflow"),
+            JobResult(Status.FAILED, "underflow"),
         ),
         (
             Kind.SCENE,
             0,
             json.dumps({"outcome": "separated", "failure": None}),
             "",
-            Verdict(Status.SUCCEEDED, "separated"),
+            JobResult(Status.SUCCEEDED, "separated"),
         ),
     ],
 )
 def test_how_a_job_has_ended(kind, status, output, last_words, expected):
-    assert verdict(kind, status, output, last_words) == expected
+    assert job_result(kind, status, output, last_words) == expected

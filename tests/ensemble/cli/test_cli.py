@@ -107,7 +107,7 @@ def test_a_launcher_of_another_mpi_is_noticed(ensemble, tmp_path):
 )
 def test_under_a_launcher_only_rank_0_speaks(launcher, tmp_path, monkeypatch, arguments):
     monkeypatch.chdir(tmp_path)
-    result = launcher.run(2, [sys.executable, "-m", "ensemble.cli.main", *arguments])
+    result = launcher.run(2, [sys.executable, "-m", "ensemble", *arguments])
     assert result.returncode == 2
     assert result.stdout == ""
     message = [line for line in result.stderr.splitlines() if "no-such" in line or "tolerance" in line]
@@ -166,7 +166,7 @@ def test_a_program_reads_progress_in_lines_of_json(ensemble, bisect_command, tmp
 
 
 def test_run_under_a_launcher_is_one_run(launcher, stored_run):
-    result = launcher.run(2, [sys.executable, "-m", "ensemble.cli.main", "run", *QUICK_SCENE, "--json"])
+    result = launcher.run(2, [sys.executable, "-m", "ensemble", "run", *QUICK_SCENE, "--json"])
     assert result.returncode == 0, result.stderr
     assert json.loads(result.stdout)["run_key"] == stored_run[1]["run_key"]
 

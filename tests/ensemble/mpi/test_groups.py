@@ -132,7 +132,7 @@ def test_a_killed_rank_of_a_group_ends_the_job(launcher, tmp_path):
             ranks = {
                 int(process.environ()["PMI_RANK"]): process
                 for process in psutil.Process(launched.pid).children(recursive=True)
-                if "PMI_RANK" in process.environ() and "ensemble.cli.main" in process.cmdline()
+                if "PMI_RANK" in process.environ() and "ensemble" in process.cmdline()
             }
         time.sleep(2.0)
         family = psutil.Process(launched.pid).children(recursive=True)
@@ -164,7 +164,7 @@ LONG, SHORT = (
     for horizon in (1e6, 2.0)
 )
 
-class Agenda:
+class MadeUpQueue:
     known_answers = runs_left = cancellations = 0
 
     def __init__(self):
@@ -200,8 +200,8 @@ with abort_guard(communicator):
         Store.open(path).close()
     communicator.barrier()
     with Store.existing(path) as store:
-        agenda, cost = carry_out(communicator, 2, store, Agenda, lambda *_: None, lambda agenda: agenda)
-    print(f"runs {cost.runs}, cancelled {agenda.cancellations};", end=" ")
+        queue, cost = carry_out(communicator, 2, store, MadeUpQueue, lambda *_: None, lambda queue: queue)
+    print(f"runs {cost.runs}, cancelled {queue.cancellations};", end=" ")
 """
 
 

@@ -20,8 +20,8 @@ from hypothesis import strategies as st
 
 from ensemble.config.study import Study, load_study
 from ensemble.mpi.usage import Usage
-from ensemble.search.point_search import Trial
-from ensemble.search.study_planner import Coordinator
+from ensemble.search.point_search import SearchRun
+from ensemble.search.study_planner import StudyPlanner
 from ensemble.store import Store
 from solver.analysis.run import Outcome
 from solver.scene import Shear
@@ -34,7 +34,7 @@ def critical(rate: float) -> float:
     return 0.1 + 0.571 * rate
 
 
-def outcome_of(task: Trial) -> Outcome:
+def outcome_of(task: SearchRun) -> Outcome:
     assert task.scene.adhesion is not None
     assert isinstance(task.scene.flow, Shear)
     bound = task.scene.adhesion.hamaker > critical(task.scene.flow.rate)
@@ -50,30 +50,30 @@ def study() -> Study:
     return load_study("critical-hamaker", ["sweep.values=[0.25, 0.75, 1.5]"], tolerance=0.05)
 
 
-def trace(
-    coordinator: Coordinator,
+def run_study(
+    planner: StudyPlanner,
     workers: int,
     choose: Callable[[int], int],
-    answer: Callable[[Trial], Outcome] = outcome_of,
-) -> list[Trial]:
+    answer: Callable[[SearchRun], Outcome] = outcome_of,
+) -> list[SearchRun]:
     """Keep workers busy, finishing at each turn the task that `choose` picks among those out."""
-    out: list[Trial] = []
-    made: list[Trial] = []
-    while not coordinator.done:
-        while len(out) < workers and (task := coordinator.next_task()) is not None:
+    out: list[SearchRun] = []
+    made: list[SearchRun] = []
+    while not planner.done:
+        while len(out) < workers and (task := planner.next_task()) is not None:
             out.append(task)
         task = out.pop(choose(len(out)))
         made.append(task)
-        coordinator.answer(task, answer(task))
-        for pointless in coordinator.pointless_tasks():
+        planner.answer(task, answer(task))
+        for pointless in planner.pointless_tasks():
             out.remove(pointless)
-            coordinator.cancelled(pointless)
+            planner.cancelled(pointless)
     assert not out
     return made
 
 
-def brackets(coordinator: Coordinator) -> list[tuple[float | None, float | None]]:
-    return [point.bracket for point in coordinator.boundary().points]
+def brackets(planner: StudyPlanner) -> list[tuple[float | None, float | None]]:
+    return [point.bracket for point in planner.boundary().points]
 
 
 @settings(deadline=None, max_examples=40)
@@ -81,9 +81,9 @@ def brackets(coordinator: Coordinator) -> list[tuple[float | None, float | None]
 def test_brackets_depend_neither_on_the_workers_nor_on_the_order_of_answers(
     study: Study, workers: int, data: st.DataObject
 ) -> None:
-    alone, together = Coordinator(study, unknown), Coordinator(study, unknown)
-    trace(alone, 1, lambda out: 0)
-    made = trace(together, workers, lambda out: data.draw(st.integers(0, out - 1)))
+    alone, together = StudyPlanner(study, unknown), StudyPlanner(study, unknown)
+    run_study(alone, 1, lambda out: 0)
+    made = run_study(together, workers, lambda out: data.draw(st.integers(0, out - 1)))
     assert brackets(together) == brackets(alone)
     assert len({task.key for task in made}) == len(made)
     for point in together.boundary().points:
@@ -99,21 +99,21 @@ def test_brackets_depend_neither_on_the_workers_nor_on_the_order_of_answers(
 @settings(deadline=None, max_examples=20)
 @given(kept=st.sets(st.integers(0, 40)))
 def test_what_is_known_is_never_run_again_and_changes_nothing(study: Study, kept: set[int]) -> None:
-    first = Coordinator(study, unknown)
-    made = trace(first, 3, lambda out: out - 1)
+    first = StudyPlanner(study, unknown)
+    made = run_study(first, 3, lambda out: out - 1)
     known = {task.key: outcome_of(task) for index, task in enumerate(made) if index in kept}
-    resumed = Coordinator(study, known.get, [task.scene for task in made])
+    resumed = StudyPlanner(study, known.get, [task.scene for task in made])
     assert resumed.known_answers == len(known)
-    again = trace(resumed, 2, lambda out: 0)
+    again = run_study(resumed, 2, lambda out: 0)
     assert brackets(resumed) == brackets(first)
     assert not {task.key for task in again} & known.keys()
 
 
 def test_a_study_with_every_answer_has_no_task(study: Study) -> None:
-    first = Coordinator(study, unknown)
-    made = trace(first, 2, lambda out: 0)
+    first = StudyPlanner(study, unknown)
+    made = run_study(first, 2, lambda out: 0)
     known = {task.key: outcome_of(task) for task in made}
-    again = Coordinator(study, known.get, [task.scene for task in made])
+    again = StudyPlanner(study, known.get, [task.scene for task in made])
     assert again.done
     assert again.next_task() is None
     assert [point.runs for point in again.boundary().points] == [
@@ -122,17 +122,17 @@ def test_a_study_with_every_answer_has_no_task(study: Study) -> None:
 
 
 def test_runs_of_other_scenes_are_no_answers(study: Study) -> None:
-    task = Coordinator(study, unknown).next_task()
+    task = StudyPlanner(study, unknown).next_task()
     assert task is not None
     finer = task.scene.model_copy(update={"numerics": task.scene.numerics.model_copy(update={"points": 128})})
     known = {task.key: Outcome.BOUND}
-    assert Coordinator(study, known.get, [finer]).known_answers == 1, "same place, found by the key"
-    assert Coordinator(study, {"another": Outcome.BOUND}.get, [finer]).known_answers == 0
+    assert StudyPlanner(study, known.get, [finer]).known_answers == 1, "same place, found by the key"
+    assert StudyPlanner(study, {"another": Outcome.BOUND}.get, [finer]).known_answers == 0
 
 
 def test_workers_get_different_searches_before_any_search_gets_two(study: Study) -> None:
-    coordinator = Coordinator(study, unknown)
-    tasks = [coordinator.next_task() for _ in range(6)]
+    planner = StudyPlanner(study, unknown)
+    tasks = [planner.next_task() for _ in range(6)]
     rates = [task.sweep_value for task in tasks if task is not None]
     assert rates == [0.25, 0.75, 1.5, 0.25, 0.75, 1.5]
 
@@ -141,42 +141,42 @@ def test_the_last_search_is_cut_by_all_workers(study: Study) -> None:
     one_point = load_study("critical-hamaker", ["sweep.values=[0.5]"], tolerance=0.01)
     turns = {}
     for workers in (1, 3):
-        coordinator, turns[workers] = Coordinator(one_point, unknown), 0
-        while not coordinator.done:
-            tasks = [task for _ in range(workers) if (task := coordinator.next_task()) is not None]
+        planner, turns[workers] = StudyPlanner(one_point, unknown), 0
+        while not planner.done:
+            tasks = [task for _ in range(workers) if (task := planner.next_task()) is not None]
             for task in tasks:
-                coordinator.answer(task, outcome_of(task))
+                planner.answer(task, outcome_of(task))
             turns[workers] += 1
     assert turns[3] <= math.ceil(0.7 * turns[1])
 
 
 def test_a_slow_run_near_the_critical_value_is_not_waited_for() -> None:
     one_point = load_study("critical-hamaker", ["sweep.values=[0.5]"], tolerance=0.05)
-    coordinator = Coordinator(one_point, unknown)
+    planner = StudyPlanner(one_point, unknown)
     slow = None
-    while (task := coordinator.next_task()) is not None:
+    while (task := planner.next_task()) is not None:
         if slow is None and abs(task.value / critical(0.5) - 1) < 0.05:
             slow = task  # it never comes back
         else:
-            coordinator.answer(task, outcome_of(task))
+            planner.answer(task, outcome_of(task))
     assert slow is not None
-    low, high = coordinator.boundary().points[0].bracket
+    low, high = planner.boundary().points[0].bracket
     assert low is not None
     assert high is not None
-    if slow in coordinator.pointless_tasks():
-        assert coordinator.done
+    if slow in planner.pointless_tasks():
+        assert planner.done
     else:
         assert low < slow.value < high < low * (1 + one_point.search.tolerance) ** 2
 
 
 def test_failed_and_contradictory_runs_are_reported_not_averaged(study: Study) -> None:
-    failing = Coordinator(study, unknown)
-    trace(failing, 2, lambda out: 0, answer=lambda task: Outcome.FAILED)
+    failing = StudyPlanner(study, unknown)
+    run_study(failing, 2, lambda out: 0, answer=lambda task: Outcome.FAILED)
     assert {point.status for point in failing.boundary().points} == {"failed"}
 
     reversed_outcomes = {Outcome.BOUND: Outcome.SEPARATED, Outcome.SEPARATED: Outcome.BOUND}
-    contrary = Coordinator(study, unknown)
-    trace(contrary, 2, lambda out: 0, answer=lambda task: reversed_outcomes[outcome_of(task)])
+    contrary = StudyPlanner(study, unknown)
+    run_study(contrary, 2, lambda out: 0, answer=lambda task: reversed_outcomes[outcome_of(task)])
     assert all(point.status in ("non-monotone", "unbracketed") for point in contrary.boundary().points)
 
 
@@ -184,11 +184,11 @@ def test_finished_searches_tell_the_later_ones_where_to_begin() -> None:
     rates = [0.25, 0.5, 0.75, 1.0, 1.25, 1.5]
     whole = load_study("critical-hamaker", ["search.guesses=[]"], 0.01)
     assert list(whole.sweep.values) == rates
-    together = len(trace(Coordinator(whole, unknown), 1, lambda out: 0))
+    together = len(run_study(StudyPlanner(whole, unknown), 1, lambda out: 0))
     apart = sum(
         len(
-            trace(
-                Coordinator(
+            run_study(
+                StudyPlanner(
                     load_study("critical-hamaker", ["search.guesses=[]", f"sweep.values=[{rate}]"], 0.01),
                     unknown,
                 ),
@@ -272,7 +272,7 @@ def ranks_of(launched: subprocess.Popen[str]) -> dict[int, psutil.Process]:
     found = {}
     for process in psutil.Process(launched.pid).children(recursive=True):
         environment = process.environ()
-        if "PMI_RANK" in environment and "ensemble.cli.main" in process.cmdline():
+        if "PMI_RANK" in environment and "ensemble" in process.cmdline():
             found[int(environment["PMI_RANK"])] = process
     return found
 
@@ -326,7 +326,7 @@ EXPLODING = """
 import sys
 from pathlib import Path
 from ensemble.mpi.world import world
-from ensemble.mpi.run_study import trace
+from ensemble.mpi.run_study import run_study
 from ensemble.store import Store
 from ensemble.config.study import load_study
 
@@ -337,7 +337,7 @@ communicator = world()
 if communicator.Get_rank() == 0:
     Store.open(Path(sys.argv[1])).close()
 communicator.barrier()
-trace(communicator, load_study("critical-hamaker"), Store.existing(Path(sys.argv[1])), explode)
+run_study(communicator, load_study("critical-hamaker"), Store.existing(Path(sys.argv[1])), explode)
 """
 
 

@@ -128,7 +128,7 @@ from ensemble.mpi.world import abort_guard, world
 from ensemble.report.paper.case import Case, StudyCase
 from ensemble.report.paper.make_paper import make_paper
 from ensemble.report.paper.comparison import number, words
-from ensemble.report.paper.section import Chapter, Drawing, Plan, Section
+from ensemble.report.paper.section import Chapter, Drawing, SectionPlan, Section
 from ensemble.store import Store
 
 def case(rate, limit=10000):
@@ -136,10 +136,10 @@ def case(rate, limit=10000):
 
 def inclination(quick):
     first = case(0.5)
-    results = yield Plan([first, case(0.9, 20)])
+    results = yield SectionPlan([first, case(0.9, 20)])
     steady = results.summary(first)
     then = case(0.25 if results.failed(case(0.9, 20)) else 1.0)
-    results = yield Plan([then])
+    results = yield SectionPlan([then])
     return Chapter([
         "Text.",
         [number("inclination", 32.0, steady.inclination_angle, [first], allowed=2, unit="°"),
@@ -152,7 +152,7 @@ def boundary(quick):
         "sweep.values": [0.5], "search.tolerance": 0.4, "search.limits": [0.2, 0.5],
         "scene.numerics.points": 32, "scene.numerics.tolerance": 1e-3,
     })
-    results = yield Plan([case(0.5)], [study])
+    results = yield SectionPlan([case(0.5)], [study])
     return Chapter([[words("boundary", "converged", results.points(study)[0.5].status, study)]])
 
 sections = [Section("a", "A", inclination), Section("b", "B", boundary)]

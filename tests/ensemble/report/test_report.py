@@ -21,7 +21,7 @@ from ensemble.report.scenes import SCENES
 from ensemble.report.shape import shape_distance
 from ensemble.report.stability import (
     Stability,
-    Verdict,
+    StabilityVerdict,
     energy_rise,
     judge,
     quick_groups,
@@ -268,18 +268,18 @@ def test_verdicts_follow_the_criteria():
     coarse = Numerics(points=48, tolerance=1e-3)
     run = simulate(pair.model_copy(update={"horizon": 2.0, "numerics": coarse}))
     rise = energy_rise(run)
-    assert judge(run, rise) == (Verdict.FINE, "")
+    assert judge(run, rise) == (StabilityVerdict.FINE, "")
 
     def with_errors(**errors: float):
         return replace(run, error=replace(run.error, **errors))
 
-    assert judge(with_errors(spatial=2e-3), rise)[0] is Verdict.SPACE
-    assert judge(with_errors(spatial=float("nan")), rise)[0] is Verdict.SPACE
-    assert judge(with_errors(area=2e-2), rise)[0] is Verdict.TIME
-    assert judge(with_errors(closure=2e-2), rise)[0] is Verdict.TIME
-    assert judge(run, 2e-3)[0] is Verdict.TIME
+    assert judge(with_errors(spatial=2e-3), rise)[0] is StabilityVerdict.SPACE
+    assert judge(with_errors(spatial=float("nan")), rise)[0] is StabilityVerdict.SPACE
+    assert judge(with_errors(area=2e-2), rise)[0] is StabilityVerdict.TIME
+    assert judge(with_errors(closure=2e-2), rise)[0] is StabilityVerdict.TIME
+    assert judge(run, 2e-3)[0] is StabilityVerdict.TIME
     failed = replace(run, outcome=Outcome.FAILED, failure="no step is small enough")
-    assert judge(failed, rise) == (Verdict.FAILED, "no step is small enough")
+    assert judge(failed, rise) == (StabilityVerdict.FAILED, "no step is small enough")
 
 
 def test_the_energy_rise_is_the_largest_above_any_earlier_value():
@@ -297,7 +297,11 @@ def test_a_scene_that_raises_does_not_hide_the_others(store):
     rows = stability(
         Runs(store, lambda line: None), {"group": {"broken": broken, "limited": limited, "good": good}}
     ).rows
-    assert [row.verdict for row in rows] == [Verdict.FAILED, Verdict.FAILED, Verdict.FINE]
+    assert [row.verdict for row in rows] == [
+        StabilityVerdict.FAILED,
+        StabilityVerdict.FAILED,
+        StabilityVerdict.FINE,
+    ]
     assert rows[0].failure.startswith("raised ")
     assert "work limit" in rows[1].failure
     assert rows[2].smallest_step > 0

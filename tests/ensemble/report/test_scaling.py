@@ -135,10 +135,10 @@ import sys
 from pathlib import Path
 from ensemble.mpi.world import abort_guard, world
 from ensemble.report.scaling.make_scaling import measured
-from ensemble.report.scaling.scaling_plan import Plan
+from ensemble.report.scaling.scaling_plan import ScalingPlan
 communicator = world()
 with abort_guard(communicator):
-    plan = Plan(shared=(2, 8), alone=(2, 8, 12), weak=8, repeats=1)
+    plan = ScalingPlan(shared=(2, 8), alone=(2, 8, 12), weak=8, repeats=1)
     document = measured(communicator, plan, lambda line: None)
     assert (document is None) == (communicator.Get_rank() > 0)
     if document is not None:

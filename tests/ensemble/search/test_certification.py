@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ensemble.config.study import load_study
-from ensemble.search.certification import Certification, Verdict, finer
+from ensemble.search.certification import Certification, CertificationResult, finer
 from ensemble.search.critical_value import Side
 from ensemble.search.grid import GeometricGrid
 from solver.scene import Numerics
@@ -47,16 +47,20 @@ def finish(certifying: Certification, physics: Physics, workers: int = 1, order:
     return answers
 
 
-def expected(low: int, physics: Physics) -> tuple[Verdict, tuple[float, float] | None]:
+def expected(low: int, physics: Physics) -> tuple[CertificationResult, tuple[float, float] | None]:
     """What the physics says, by looking at every value."""
     lows = [index for index in INDICES if index <= low and physics(index) is Side.LOW]
     highs = [index for index in INDICES if index > low and physics(index) is Side.HIGH]
     if not lows or not highs:
-        return Verdict.UNCERTIFIED, None
+        return CertificationResult.UNCERTIFIED, None
     bracket = (GRID.value(lows[-1]), GRID.value(highs[0]))
     reversed_below = any(physics(index) is Side.HIGH for index in range(lows[-1], low + 1))
     reversed_above = any(physics(index) is Side.LOW for index in range(low + 1, highs[0]))
-    return (Verdict.NON_MONOTONE if reversed_below and reversed_above else Verdict.CONVERGED), bracket
+    return (
+        CertificationResult.NON_MONOTONE
+        if reversed_below and reversed_above
+        else CertificationResult.CONVERGED
+    ), bracket
 
 
 @st.composite
@@ -102,7 +106,7 @@ def test_a_shifted_threshold_widens_the_bracket_on_its_side_only(
 ) -> None:
     certifying = certification(10)
     made = finish(certifying, lambda index: Side.LOW if index < 11 + shift else Side.HIGH)
-    assert certifying.verdict is Verdict.CONVERGED
+    assert certifying.verdict is CertificationResult.CONVERGED
     assert certifying.bracket == tuple(map(GRID.value, bracket))
     assert made == answers
 
@@ -111,7 +115,7 @@ def test_an_end_without_an_answer_moves_on() -> None:
     silent = {10: Side.FAILED, 9: Side.UNDECIDED}
     certifying = certification(10)
     finish(certifying, lambda index: silent.get(index, Side.LOW if index < 11 else Side.HIGH))
-    assert certifying.verdict is Verdict.CONVERGED
+    assert certifying.verdict is CertificationResult.CONVERGED
     assert certifying.bracket == (GRID.value(8), GRID.value(11))
 
 
@@ -123,7 +127,7 @@ def test_both_ends_are_tried_at_once_and_a_lost_end_makes_the_other_pointless() 
     assert certifying.ends_left == 2
     assert low is not None
     certifying.tell(low, Side.HIGH)
-    assert certifying.verdict is Verdict.UNCERTIFIED
+    assert certifying.verdict is CertificationResult.UNCERTIFIED
     assert certifying.pointless() == {high}
 
 

@@ -14,8 +14,8 @@ from ensemble.cli.result_tables import boundary_cells, boundary_columns
 from ensemble.config.study import Study, load_study
 from ensemble.search.boundary import BoundaryPoint
 from ensemble.search.grid import GeometricGrid
-from ensemble.search.point_search import Trial
-from ensemble.search.study_planner import Coordinator
+from ensemble.search.point_search import SearchRun
+from ensemble.search.study_planner import StudyPlanner
 from ensemble.store.run_key import run_key
 from solver.analysis.run import Outcome
 from solver.scene import Numerics, Shear
@@ -31,7 +31,7 @@ class TwoNumerics:
     shift: float = 1.0  # finer threshold over coarse threshold
     silence: float = 1.0  # finer runs from threshold/silence up to threshold·silence are undecided
 
-    def __call__(self, task: Trial) -> Outcome:
+    def __call__(self, task: SearchRun) -> Outcome:
         assert task.scene.adhesion is not None
         assert isinstance(task.scene.flow, Shear)
         critical = 0.1 + 0.571 * task.scene.flow.rate
@@ -43,7 +43,7 @@ class TwoNumerics:
         return Outcome.BOUND if ratio > 1 else Outcome.SEPARATED
 
 
-def is_finer(task: Trial) -> bool:
+def is_finer(task: SearchRun) -> bool:
     return task.scene.numerics.points == 128
 
 
@@ -56,28 +56,28 @@ def study() -> Study:
     return load_study("critical-hamaker", ["sweep.values=[0.25, 0.75, 1.5]"], 0.05, certify=True)
 
 
-def trace(
-    coordinator: Coordinator,
-    answer: Callable[[Trial], Outcome],
+def run_study(
+    planner: StudyPlanner,
+    answer: Callable[[SearchRun], Outcome],
     workers: int = 1,
     choose: Callable[[int], int] = lambda out: 0,
-) -> list[Trial]:
+) -> list[SearchRun]:
     """Keep workers busy, finishing at each turn the task that `choose` picks among those out."""
-    out: list[Trial] = []
-    made: list[Trial] = []
-    while not coordinator.done:
-        while len(out) < workers and (task := coordinator.next_task()) is not None:
+    out: list[SearchRun] = []
+    made: list[SearchRun] = []
+    while not planner.done:
+        while len(out) < workers and (task := planner.next_task()) is not None:
             out.append(task)
         if not out:
-            assert coordinator.done, "known answers were all that it needed"
+            assert planner.done, "known answers were all that it needed"
             break
         made.append(out.pop(choose(len(out))))
-        coordinator.answer(made[-1], answer(made[-1]))
-        for pointless in coordinator.pointless_tasks():
+        planner.answer(made[-1], answer(made[-1]))
+        for pointless in planner.pointless_tasks():
             out.remove(pointless)
-            coordinator.cancelled(pointless)
+            planner.cancelled(pointless)
     assert not out
-    assert coordinator.next_task() is None
+    assert planner.next_task() is None
     return made
 
 
@@ -96,9 +96,9 @@ numerics_apart = st.builds(
 def test_certified_points_depend_neither_on_the_workers_nor_on_the_order_of_answers(
     study: Study, physics: TwoNumerics, workers: int, data: st.DataObject
 ) -> None:
-    alone, together = Coordinator(study, unknown), Coordinator(study, unknown)
-    trace(alone, physics)
-    made = trace(together, physics, workers, lambda out: data.draw(st.integers(0, out - 1)))
+    alone, together = StudyPlanner(study, unknown), StudyPlanner(study, unknown)
+    run_study(alone, physics)
+    made = run_study(together, physics, workers, lambda out: data.draw(st.integers(0, out - 1)))
     assert answers(together.boundary().points) == answers(alone.boundary().points)
     assert len({task.key for task in made}) == len(made)
     for point in together.boundary().points:
@@ -120,11 +120,11 @@ def test_certified_points_depend_neither_on_the_workers_nor_on_the_order_of_answ
 def test_what_is_known_is_never_run_again_and_changes_nothing(
     study: Study, physics: TwoNumerics, kept: set[int]
 ) -> None:
-    first = Coordinator(study, unknown)
-    made = trace(first, physics, 3, lambda out: out - 1)
+    first = StudyPlanner(study, unknown)
+    made = run_study(first, physics, 3, lambda out: out - 1)
     known = {task.key: physics(task) for index, task in enumerate(made) if index in kept}
-    resumed = Coordinator(study, known.get, [task.scene for task in made])
-    again = trace(resumed, physics, 2)
+    resumed = StudyPlanner(study, known.get, [task.scene for task in made])
+    again = run_study(resumed, physics, 2)
     assert answers(resumed.boundary().points) == answers(first.boundary().points)
     assert not {task.key for task in again} & known.keys()
     assert resumed.known_answers == len(known)
@@ -132,19 +132,19 @@ def test_what_is_known_is_never_run_again_and_changes_nothing(
 
 def test_asked_for_later_a_certification_adds_only_its_own_runs(study: Study) -> None:
     physics = TwoNumerics(shift=1.2)
-    plain = Coordinator(load_study("critical-hamaker", ["sweep.values=[0.25, 0.75, 1.5]"], 0.05), unknown)
-    searched = trace(plain, physics)
+    plain = StudyPlanner(load_study("critical-hamaker", ["sweep.values=[0.25, 0.75, 1.5]"], 0.05), unknown)
+    searched = run_study(plain, physics)
     assert not any(is_finer(task) for task in searched)
     assert {(point.certified, point.certified_by) for point in plain.boundary().points} == {(False, None)}
 
     known = {task.key: physics(task) for task in searched}
-    certified = Coordinator(study, known.get, [task.scene for task in searched])
-    added = trace(certified, physics, 2)
+    certified = StudyPlanner(study, known.get, [task.scene for task in searched])
+    added = run_study(certified, physics, 2)
     assert added
     assert all(is_finer(task) for task in added)
 
     known |= {task.key: physics(task) for task in added}
-    again = Coordinator(study, known.get, [task.scene for task in (*searched, *added)])
+    again = StudyPlanner(study, known.get, [task.scene for task in (*searched, *added)])
     assert again.done
     assert again.next_task() is None
     assert again.known_answers == len(searched) + len(added)
@@ -154,28 +154,28 @@ def test_asked_for_later_a_certification_adds_only_its_own_runs(study: Study) ->
 
 def test_a_point_is_its_search_until_both_ends_are_certified(study: Study) -> None:
     one_point = load_study("critical-hamaker", ["sweep.values=[0.5]"], 0.05, certify=True)
-    coordinator, physics = Coordinator(one_point, unknown), TwoNumerics()
-    while (task := coordinator.next_task()) is not None and not is_finer(task):
-        coordinator.answer(task, physics(task))
-    other = coordinator.next_task()
+    planner, physics = StudyPlanner(one_point, unknown), TwoNumerics()
+    while (task := planner.next_task()) is not None and not is_finer(task):
+        planner.answer(task, physics(task))
+    other = planner.next_task()
     assert task is not None
     assert other is not None
-    assert coordinator.next_task() is None
-    (point,) = coordinator.boundary().points
+    assert planner.next_task() is None
+    (point,) = planner.boundary().points
     assert (task.value, other.value) == point.bracket, "both ends at once"
     assert (point.status, point.certified, point.certified_by) == ("certifying", False, None)
-    assert coordinator.runs_left == 2
-    coordinator.answer(task, Outcome.FAILED)
-    assert coordinator.boundary().points[0].bracket == point.bracket
-    assert coordinator.boundary().points[0].status == "certifying"
+    assert planner.runs_left == 2
+    planner.answer(task, Outcome.FAILED)
+    assert planner.boundary().points[0].bracket == point.bracket
+    assert planner.boundary().points[0].status == "certifying"
 
 
 def test_what_cannot_be_certified_says_so_and_keeps_its_bracket(study: Study) -> None:
     physics = TwoNumerics()
-    plain = Coordinator(load_study("critical-hamaker", ["sweep.values=[0.25, 0.75, 1.5]"], 0.05), unknown)
-    trace(plain, physics)
-    failing = Coordinator(study, unknown)
-    trace(failing, lambda task: Outcome.FAILED if is_finer(task) else physics(task), 2)
+    plain = StudyPlanner(load_study("critical-hamaker", ["sweep.values=[0.25, 0.75, 1.5]"], 0.05), unknown)
+    run_study(plain, physics)
+    failing = StudyPlanner(study, unknown)
+    run_study(failing, lambda task: Outcome.FAILED if is_finer(task) else physics(task), 2)
     for point, searched in zip(failing.boundary().points, plain.boundary().points, strict=True):
         assert (point.status, point.certified, point.certified_by) == ("uncertified", False, None)
         assert (point.bracket, point.outcomes) == (searched.bracket, searched.outcomes)
@@ -186,7 +186,7 @@ def test_a_contradiction_at_the_finer_numerics_is_reported(study: Study) -> None
     values: dict[float, list[float]] = {}
     swapped = {Outcome.BOUND: Outcome.SEPARATED, Outcome.SEPARATED: Outcome.BOUND}
 
-    def contrary(task: Trial) -> Outcome:
+    def contrary(task: SearchRun) -> Outcome:
         """Two finer runs of a point, those at the ends of its bracket, come out on the wrong sides."""
         if is_finer(task):
             values.setdefault(task.sweep_value, []).append(task.value)
@@ -194,9 +194,9 @@ def test_a_contradiction_at_the_finer_numerics_is_reported(study: Study) -> None
                 return swapped[physics(task)]
         return physics(task)
 
-    coordinator = Coordinator(study, unknown)
-    trace(coordinator, contrary, 8)
-    for point in coordinator.boundary().points:
+    planner = StudyPlanner(study, unknown)
+    run_study(planner, contrary, 8)
+    for point in planner.boundary().points:
         assert (point.status, point.certified) == ("non-monotone", False)
         low, high = point.bracket
         assert low is not None
@@ -206,33 +206,33 @@ def test_a_contradiction_at_the_finer_numerics_is_reported(study: Study) -> None
 
 def test_a_late_answer_that_contradicts_the_search_ends_its_certification() -> None:
     one_point = load_study("critical-hamaker", ["sweep.values=[0.5]"], 0.05, certify=True)
-    coordinator, physics = Coordinator(one_point, unknown), TwoNumerics()
-    late = coordinator.next_task()
+    planner, physics = StudyPlanner(one_point, unknown), TwoNumerics()
+    late = planner.next_task()
     assert late is not None
-    while (task := coordinator.next_task()) is not None and not is_finer(task):
-        coordinator.answer(task, physics(task))
+    while (task := planner.next_task()) is not None and not is_finer(task):
+        planner.answer(task, physics(task))
     assert task is not None
-    assert late in coordinator.pointless_tasks()
+    assert late in planner.pointless_tasks()
     above = late.value > task.value
-    coordinator.answer(late, Outcome.SEPARATED if above else Outcome.BOUND)
-    assert coordinator.boundary().points[0].status == "non-monotone"
-    assert coordinator.done
-    assert coordinator.pointless_tasks() == (task,)
-    coordinator.cancelled(task)
-    assert coordinator.next_task() is None
+    planner.answer(late, Outcome.SEPARATED if above else Outcome.BOUND)
+    assert planner.boundary().points[0].status == "non-monotone"
+    assert planner.done
+    assert planner.pointless_tasks() == (task,)
+    planner.cancelled(task)
+    assert planner.next_task() is None
 
 
 def test_certifying_comes_before_a_second_task_of_one_search() -> None:
     two_points = load_study("critical-hamaker", ["sweep.values=[0.5, 1.0]"], 0.05, certify=True)
-    coordinator, physics = Coordinator(two_points, unknown), TwoNumerics()
-    tasks: list[Trial] = []
+    planner, physics = StudyPlanner(two_points, unknown), TwoNumerics()
+    tasks: list[SearchRun] = []
     while not any(map(is_finer, tasks)):
-        task = coordinator.next_task()
+        task = planner.next_task()
         assert task is not None
         tasks.append(task)
         if task.sweep_value == 0.5 and not is_finer(task):
-            coordinator.answer(task, physics(task))
-    other_end, second = coordinator.next_task(), coordinator.next_task()
+            planner.answer(task, physics(task))
+    other_end, second = planner.next_task(), planner.next_task()
     assert tasks[-1].sweep_value == 0.5
     assert len([task for task in tasks if task.sweep_value == 1.0]) == 1
     assert other_end is not None
@@ -244,18 +244,18 @@ def test_certifying_comes_before_a_second_task_of_one_search() -> None:
 def test_a_search_that_others_finish_meanwhile_is_certified_at_once() -> None:
     one_point = load_study("critical-hamaker", ["sweep.values=[0.5]"], 0.05, certify=True)
     known: dict[str, Outcome] = {}
-    coordinator, physics = Coordinator(one_point, known.get), TwoNumerics()
-    out = coordinator.next_task()
+    planner, physics = StudyPlanner(one_point, known.get), TwoNumerics()
+    out = planner.next_task()
     scenes = [one_point.scene_at(0.5, GRID.value(index)) for index in INDICES]
     tasks = [
-        Trial(sweep_value=0.5, value=GRID.value(i), scene=scene, key=run_key(scene))
+        SearchRun(sweep_value=0.5, value=GRID.value(i), scene=scene, key=run_key(scene))
         for i, scene in zip(INDICES, scenes, strict=True)
     ]
     known.update({task.key: physics(task) for task in tasks})
-    task = coordinator.next_task()
+    task = planner.next_task()
     assert task is not None
     assert is_finer(task)
-    assert coordinator.pointless_tasks() == (out,)
+    assert planner.pointless_tasks() == (out,)
 
 
 def test_tables_name_the_numerics_and_old_documents_are_read() -> None:

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ensemble.search.critical_value import ZONE_EDGE, CriticalValue, Side, Status
+from ensemble.search.critical_value import ZONE_EDGE, CriticalValueSearch, Side, Status
 from ensemble.search.grid import GeometricGrid
 
 GRID = GeometricGrid(0.01)
@@ -35,7 +35,7 @@ class Trace:
 
 
 def finish(
-    search: CriticalValue,
+    search: CriticalValueSearch,
     physics: Physics,
     *,
     workers: int = 1,
@@ -44,19 +44,19 @@ def finish(
 ) -> Trace:
     """Run a search to its end.  With an order, answers arrive one at a time in it, and some are lost."""
     pending: list[float] = []
-    trace = Trace([], 0)
+    run_study = Trace([], 0)
     while not search.done:
         while len(pending) < workers and (value := search.ask()) is not None:
             pending.append(value)
-            trace.asked.append(value)
+            run_study.asked.append(value)
         assert pending, "a search that is not done must have asked for something"
-        trace.rounds += 1
+        run_study.rounds += 1
         answers = list(pending) if order is None else [order.choice(pending)]
         for value in answers:
             pending.remove(value)
             if order is not None and order.random() < 0.1:
                 search.withdraw(value)
-                trace.asked.remove(value)
+                run_study.asked.remove(value)
             else:
                 search.tell(value, physics(GRID.index(value)))
         if cancel:
@@ -68,7 +68,7 @@ def finish(
         before = search.status, search.bracket
         search.tell(value, physics(GRID.index(value)))
         assert (search.status, search.bracket) == before
-    return trace
+    return run_study
 
 
 def expected(physics: Physics, indices: range = INDICES) -> tuple[Status, tuple[float | None, float | None]]:
@@ -126,33 +126,33 @@ def test_bracket_depends_on_the_physics_alone(
     told: set[int],
     guess: tuple[float, float] | None,
 ) -> None:
-    search = CriticalValue(GRID, LIMITS, guess)
+    search = CriticalValueSearch(GRID, LIMITS, guess)
     for index in told:
         search.tell(GRID.value(index), physics(index))
-    trace = finish(search, physics, workers=workers, order=order, cancel=cancel)
+    run_study = finish(search, physics, workers=workers, order=order, cancel=cancel)
     assert (search.status, search.bracket) == expected(physics)
     assert search.offending == ()
     if not cancel:
-        assert len(set(trace.asked)) == len(trace.asked)
-    assert not {GRID.index(value) for value in trace.asked} & told
+        assert len(set(run_study.asked)) == len(run_study.asked)
+    assert not {GRID.index(value) for value in run_study.asked} & told
 
 
 @given(first_high=st.integers(INDICES[0] + 1, INDICES[-1]))
 def test_alone_a_search_is_a_bisection(first_high: int) -> None:
-    search = CriticalValue(GRID, LIMITS)
-    trace = finish(search, threshold_at(first_high))
+    search = CriticalValueSearch(GRID, LIMITS)
+    run_study = finish(search, threshold_at(first_high))
     low, high = search.bracket
     assert low is not None
     assert high is not None
     assert (high - low) / low < 0.01
-    assert len(trace.asked) <= math.ceil(math.log2(len(INDICES) + 1))
+    assert len(run_study.asked) <= math.ceil(math.log2(len(INDICES) + 1))
 
 
 @pytest.mark.parametrize("workers", [1, 2, 3, 4, 7, 15])
 def test_rounds_fall_with_the_logarithm_to_base_workers_plus_one(workers: int) -> None:
     thresholds = range(INDICES[0], INDICES[-1] + 2)
     rounds = [
-        finish(CriticalValue(GRID, LIMITS), threshold_at(first_high), workers=workers).rounds
+        finish(CriticalValueSearch(GRID, LIMITS), threshold_at(first_high), workers=workers).rounds
         for first_high in thresholds
     ]
     ideal = math.log(len(thresholds), workers + 1)
@@ -163,8 +163,8 @@ def test_rounds_fall_with_the_logarithm_to_base_workers_plus_one(workers: int) -
 def test_a_good_guess_saves_most_of_the_bisection() -> None:
     critical = 0.3630
     first_high = GRID.within(critical, 1.0)[0]
-    trace = finish(CriticalValue(GRID, LIMITS, guess=(0.35, 0.37)), threshold_at(first_high))
-    assert len(trace.asked) <= 5
+    run_study = finish(CriticalValueSearch(GRID, LIMITS, guess=(0.35, 0.37)), threshold_at(first_high))
+    assert len(run_study.asked) <= 5
 
 
 @given(
@@ -176,22 +176,22 @@ def test_a_wrong_guess_costs_twice_the_logarithm_of_how_wrong_it_is(
     first_high: int, center: int, half_width: int
 ) -> None:
     guess = (GRID.value(center - half_width), GRID.value(center + half_width))
-    trace = finish(CriticalValue(GRID, LIMITS, guess), threshold_at(first_high))
+    run_study = finish(CriticalValueSearch(GRID, LIMITS, guess), threshold_at(first_high))
     half_widths_off = abs(first_high - center) / half_width
-    assert len(trace.asked) <= math.log2(half_width) + 2 * math.log2(1 + half_widths_off) + 3
+    assert len(run_study.asked) <= math.log2(half_width) + 2 * math.log2(1 + half_widths_off) + 3
 
 
 def test_a_wide_zone_without_answers_is_closed_in_by_bisection() -> None:
     zone = range(-150, 50)
-    search = CriticalValue(GRID, LIMITS)
-    trace = finish(search, lambda index: Side.UNDECIDED if index in zone else threshold_at(0)(index))
+    search = CriticalValueSearch(GRID, LIMITS)
+    run_study = finish(search, lambda index: Side.UNDECIDED if index in zone else threshold_at(0)(index))
     assert search.status is Status.UNDECIDED
     assert search.bracket == (GRID.value(-151), GRID.value(50))
-    assert len(trace.asked) <= 2 * math.log2(len(INDICES)) + 2 * ZONE_EDGE
+    assert len(run_study.asked) <= 2 * math.log2(len(INDICES)) + 2 * ZONE_EDGE
 
 
 def test_a_few_failures_on_both_sides_do_not_hide_the_critical_value() -> None:
-    search = CriticalValue(GRID, LIMITS)
+    search = CriticalValueSearch(GRID, LIMITS)
     search.tell(GRID.value(-4), Side.LOW)
     for index in (-3, -2, 1, 2):
         search.tell(GRID.value(index), Side.FAILED)
@@ -202,11 +202,11 @@ def test_a_few_failures_on_both_sides_do_not_hide_the_critical_value() -> None:
 
 
 def test_a_scene_that_always_fails_is_given_up_after_few_runs() -> None:
-    search = CriticalValue(GRID, LIMITS)
-    trace = finish(search, lambda index: Side.FAILED)
+    search = CriticalValueSearch(GRID, LIMITS)
+    run_study = finish(search, lambda index: Side.FAILED)
     assert search.status is Status.FAILED
     assert search.bracket == (None, None)
-    assert len(trace.asked) <= 2 * math.log2(len(INDICES)) + 2 * ZONE_EDGE
+    assert len(run_study.asked) <= 2 * math.log2(len(INDICES)) + 2 * ZONE_EDGE
 
 
 @given(
@@ -219,7 +219,7 @@ def test_a_low_above_a_high_is_reported_whatever_the_order(sides: dict[int, Side
     lows = [index for index, side in sides.items() if side is Side.LOW]
     highs = [index for index, side in sides.items() if side is Side.HIGH]
     contradictory = bool(lows and highs and max(lows) > min(highs))
-    search = CriticalValue(GRID, LIMITS)
+    search = CriticalValueSearch(GRID, LIMITS)
     for index in order.sample(sorted(sides), len(sides)):
         search.tell(GRID.value(index), sides[index])
     assert (search.status is Status.NON_MONOTONE) == contradictory
@@ -239,7 +239,7 @@ def test_a_low_above_a_high_is_reported_whatever_the_order(sides: dict[int, Side
 
 
 def test_offending_values_and_the_bracket_around_them() -> None:
-    search = CriticalValue(GRID, LIMITS)
+    search = CriticalValueSearch(GRID, LIMITS)
     sides = {-100: Side.LOW, -50: Side.HIGH, 0: Side.UNDECIDED, 20: Side.LOW, 60: Side.HIGH, 90: Side.HIGH}
     for index, side in sides.items():
         search.tell(GRID.value(index), side)
@@ -249,7 +249,7 @@ def test_offending_values_and_the_bracket_around_them() -> None:
 
 
 def test_an_answer_makes_the_speculation_beyond_it_pointless() -> None:
-    search = CriticalValue(GRID, LIMITS)
+    search = CriticalValueSearch(GRID, LIMITS)
     middle, *others = (search.ask() for _ in range(7))
     assert middle is not None
     assert search.pointless() == frozenset()
@@ -258,7 +258,7 @@ def test_an_answer_makes_the_speculation_beyond_it_pointless() -> None:
 
 
 def test_a_contradiction_makes_every_pending_value_pointless() -> None:
-    search = CriticalValue(GRID, LIMITS)
+    search = CriticalValueSearch(GRID, LIMITS)
     pending = {search.ask() for _ in range(3)}
     search.tell(GRID.value(INDICES[0]), Side.HIGH)
     search.tell(GRID.value(INDICES[-1]), Side.LOW)
@@ -267,7 +267,7 @@ def test_a_contradiction_makes_every_pending_value_pointless() -> None:
 
 
 def test_a_withdrawn_value_is_asked_again() -> None:
-    search = CriticalValue(GRID, LIMITS)
+    search = CriticalValueSearch(GRID, LIMITS)
     first = search.ask()
     assert first is not None
     second = search.ask()
@@ -279,7 +279,7 @@ def test_a_withdrawn_value_is_asked_again() -> None:
 
 
 def test_everything_useful_pending_leaves_nothing_to_ask() -> None:
-    search = CriticalValue(GRID, (1.0, 1.1))
+    search = CriticalValueSearch(GRID, (1.0, 1.1))
     asked = [search.ask() for _ in GRID.within(1.0, 1.1)]
     assert sorted(value for value in asked if value) == [GRID.value(index) for index in GRID.within(1.0, 1.1)]
     assert search.ask() is None
@@ -287,7 +287,7 @@ def test_everything_useful_pending_leaves_nothing_to_ask() -> None:
 
 
 def test_reseeding_moves_the_first_ask_until_something_is_told() -> None:
-    search = CriticalValue(GRID, LIMITS)
+    search = CriticalValueSearch(GRID, LIMITS)
     search.reseed((0.9, 1.1))
     value = search.ask()
     assert value is not None
@@ -300,7 +300,7 @@ def test_reseeding_moves_the_first_ask_until_something_is_told() -> None:
 
 
 def test_refusals_name_what_is_wrong() -> None:
-    search = CriticalValue(GRID, LIMITS)
+    search = CriticalValueSearch(GRID, LIMITS)
     with pytest.raises(ValueError, match="not on the grid"):
         search.tell(0.3333, Side.LOW)
     with pytest.raises(ValueError, match="outside the limits"):
@@ -312,11 +312,11 @@ def test_refusals_name_what_is_wrong() -> None:
     with pytest.raises(ValueError, match="cannot be high: it was told to be low"):
         search.tell(1.0, Side.HIGH)
     with pytest.raises(ValueError, match=r"limits: \[5.0, 0.05\]"):
-        CriticalValue(GRID, (5.0, 0.05))
+        CriticalValueSearch(GRID, (5.0, 0.05))
     with pytest.raises(ValueError, match="no two values"):
-        CriticalValue(GRID, (1.001, 1.002))
+        CriticalValueSearch(GRID, (1.001, 1.002))
     with pytest.raises(ValueError, match="guess"):
-        CriticalValue(GRID, LIMITS, guess=(0.0, 1.0))
+        CriticalValueSearch(GRID, LIMITS, guess=(0.0, 1.0))
 
 
 @given(tolerance=st.floats(1e-4, 0.5), index=st.integers(-1000, 1000))

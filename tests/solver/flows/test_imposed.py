@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from solver.flows.imposed import imposed_flow
 from solver.membrane.geometry import Geometry
 from solver.scene import Extension, Shear, Trap
-from solver.simulation.initial_state import placed_state
+from solver.simulation.initial_state import initial_ellipses
 from tests.solver.scenes import geometry_of, smooth_direction, uneven_pair
 
 Array = NDArray[np.float64]
@@ -39,7 +39,7 @@ def test_the_trap_stagnates_at_the_mean_of_the_centers() -> None:
 
 
 def test_the_trap_follows_the_vesicles() -> None:
-    state, membranes = placed_state(SCENE), geometry_of(SCENE).membranes
+    state, membranes = initial_ellipses(SCENE), geometry_of(SCENE).membranes
     shifted = membranes.pack(membranes.tangent_angle(state), membranes.center(state) + np.array([3.0, -2.0]))
     trap, extension = (imposed_flow(flow(rate=0.7), membranes) for flow in (Trap, Extension))
     here, there = Geometry(membranes, state), Geometry(membranes, shifted)
@@ -50,7 +50,7 @@ def test_the_trap_follows_the_vesicles() -> None:
 @pytest.mark.parametrize("flow", FLOWS, ids=lambda flow: flow.kind)
 def test_the_jacobian_is_exact(flow: Shear | Extension | Trap) -> None:
     """The velocity is linear in the points, so a difference has no truncation error."""
-    state, membranes = placed_state(SCENE), geometry_of(SCENE).membranes
+    state, membranes = initial_ellipses(SCENE), geometry_of(SCENE).membranes
     term = imposed_flow(flow, membranes)
     before, after = Geometry(membranes, state), Geometry(membranes, state + smooth_direction(membranes))
     moved = (after.points - before.points).reshape(2, -1, 1)

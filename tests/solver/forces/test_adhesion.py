@@ -16,7 +16,7 @@ from solver.membrane.geometry import Geometry
 from solver.potentials.proximity import Closeness, gap
 from solver.scene import Adhesion as AdhesionParameters
 from solver.scene import Numerics, Scene, Vesicle
-from solver.simulation.initial_state import placed_state
+from solver.simulation.initial_state import initial_ellipses
 from tests.solver.references import Ellipse, integrate, nearest_parameter
 from tests.solver.scenes import geometry_of, smooth_direction, uneven_pair
 
@@ -65,7 +65,7 @@ def test_the_force_is_minus_the_gradient_of_the_energy(exponents: tuple[int, int
     """Work done along a deformation without stretching, against a fourth-order difference of the energy."""
     scene = uneven_pair(exponents=exponents, numerics=Numerics(points=128))
     geometry = geometry_of(scene)
-    membranes, state = geometry.membranes, placed_state(scene)
+    membranes, state = geometry.membranes, initial_ellipses(scene)
     direction, step = smooth_direction(membranes), 2e-3
     assert scene.adhesion
     adhesion = Adhesion(scene.adhesion, 1e-12)
@@ -196,7 +196,7 @@ def test_the_jacobian_is_exact(exponents: tuple[int, int], points: int) -> None:
     At 32 points the nearest ones are refined.
     """
     scene = uneven_pair(exponents=exponents, numerics=Numerics(points=points))
-    state = placed_state(scene)
+    state = initial_ellipses(scene)
     geometry = geometry_of(scene)
     membranes = geometry.membranes
     assert scene.adhesion

@@ -11,7 +11,7 @@ from solver.membrane.geometry import Geometry
 from solver.potentials.proximity import Closeness
 from solver.potentials.single_layer import SingleLayer
 from solver.scene import Numerics, Scene, Vesicle
-from solver.simulation.initial_state import placed_state
+from solver.simulation.initial_state import initial_ellipses
 from tests.solver.scenes import geometry_of, smooth_direction, uneven_pair
 
 Array = NDArray[np.float64]
@@ -70,13 +70,13 @@ def test_nothing_stretches(scene: Scene) -> None:
     x, y = geometry.points
     imposed = np.stack([y**2, 0.3 * x**2])  # without divergence: a circle cannot swell
     before = stretching(geometry, imposed)
-    tension, velocity, turning = Inextensibility(1e-12, ROUND_OFF).solve(layer, geometry, imposed)
+    tension, velocity, rotation_rate = Inextensibility(1e-12, ROUND_OFF).solve(layer, geometry, imposed)
     assert np.max(np.abs(before)) > 0.1
     assert np.max(np.abs(stretching(geometry, velocity))) < 1e-11
     correction = velocity - imposed
     np.testing.assert_allclose(caused_velocity(layer, geometry, tension), correction, rtol=0, atol=1e-11)
     normal_change = np.sum(geometry.normals * geometry.arclength_derivative(velocity), axis=0)
-    np.testing.assert_allclose(turning, normal_change, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(rotation_rate, normal_change, rtol=0, atol=1e-12)
 
 
 def test_the_tension_of_a_circle_in_shear() -> None:
@@ -99,7 +99,7 @@ def test_the_tension_of_a_circle_in_shear() -> None:
 def test_the_inverse_of_another_geometry_changes_nothing_but_the_work() -> None:
     scene = uneven_pair()
     geometry = geometry_of(scene)
-    moved = Geometry(geometry.membranes, placed_state(scene) + 0.3 * smooth_direction(geometry.membranes))
+    moved = Geometry(geometry.membranes, initial_ellipses(scene) + 0.3 * smooth_direction(geometry.membranes))
     load = np.stack([moved.points[1], np.zeros_like(moved.points[1])])
     fresh, kept = Inextensibility(1e-12, ROUND_OFF), Inextensibility(1e-12, ROUND_OFF)
     kept.factorize(layer_of(geometry), geometry)

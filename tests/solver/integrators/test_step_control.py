@@ -12,8 +12,8 @@ from solver.integrators.control import AdaptiveStep, Attempt, ConservedError, Em
 from solver.integrators.one_step import OneStepIntegrator
 from solver.integrators.sdc import DeferredCorrection
 from solver.membrane.geometry import Geometry
-from solver.motion.dense import Dynamics
-from solver.simulation.initial_state import placed_state
+from solver.motion.dense import DenseEquation
+from solver.simulation.initial_state import initial_ellipses
 from tests.solver.scenes import uneven_pair
 from tests.solver.steps import all_steps
 
@@ -56,8 +56,8 @@ def test_conserved_quantities_may_drift_in_proportion_to_the_step() -> None:
 
 
 def test_a_gap_in_a_curve_counts_the_same_wherever_the_vesicle_is() -> None:
-    dynamics = Dynamics.of(uneven_pair())
-    state = placed_state(uneven_pair())
+    dynamics = DenseEquation.of(uneven_pair())
+    state = initial_ellipses(uneven_pair())
     state[:10] += 0.01
     far = state.copy()
     far[-4:] += 100.0

@@ -19,9 +19,9 @@ from solver.integrators.bdf import BackwardDifferentiation, BlockBackwardDiffere
 from solver.integrators.sdc import DeferredCorrection
 from solver.membrane.geometry import Geometry, Membranes
 from solver.motion import summed as summed_module
-from solver.motion.dense import Dynamics
+from solver.motion.dense import DenseEquation
 from solver.motion.equation import equation_of_motion
-from solver.motion.summed import Suspension
+from solver.motion.summed import SummedEquation
 from solver.parallel import SERIAL
 from solver.potentials import multipoles
 from solver.potentials.direct_sum import velocity as direct_velocity
@@ -29,7 +29,7 @@ from solver.potentials.neighbors import Neighbors
 from solver.potentials.proximity import Closeness, gap
 from solver.potentials.refinement import LARGEST_REFINED
 from solver.scene import LARGEST_DENSE, Adhesion, Extension, Numerics, Scene, Shear, Trap, Vesicle
-from solver.simulation.initial_state import placed_state
+from solver.simulation.initial_state import initial_ellipses
 from solver.simulation.simulate import simulate
 from tests.solver.steps import all_steps, fixed_steps
 from tests.solver.suspensions import suspension
@@ -64,15 +64,15 @@ def close_together(points: int, **fields: Any) -> Scene:
 )
 def test_sums_and_matrices_give_the_same_motion(fields: dict[str, Any]) -> None:
     scene = close_together(64, **fields)
-    state = placed_state(scene)
-    matrices, sums = Dynamics.of(scene), Suspension.of(scene, SERIAL)
+    state = initial_ellipses(scene)
+    matrices, sums = DenseEquation.of(scene), SummedEquation.of(scene, SERIAL)
     expected, found = matrices.motion(state), sums.motion(state)
     assert found.closeness
     assert expected.closeness
     factors = found.closeness.refinement(sums.layer.ratio).groups[:, 2]
     assert {2, 4} & set(factors)
     assert factors.max() > LARGEST_REFINED
-    for name in ("velocity", "turning", "tension"):
+    for name in ("velocity", "rotation_rate", "tension"):
         there, here = getattr(expected, name), getattr(found, name)
         np.testing.assert_allclose(here, there, rtol=0, atol=1e-9 * np.max(np.abs(there)), err_msg=name)
     if sums.adhesion:
@@ -89,7 +89,7 @@ def test_the_velocity_converges_spectrally_with_the_points() -> None:
 
     def centers(points: int) -> Array:
         scene = close_together(points, flow=Shear(rate=0.8))
-        return Suspension.of(scene, SERIAL).rate(placed_state(scene))[-10:]
+        return SummedEquation.of(scene, SERIAL).rate(initial_ellipses(scene))[-10:]
 
     exact = centers(256)
     errors = [np.max(np.abs(centers(points) - exact)) for points in (32, 64, 128)]
@@ -100,8 +100,8 @@ def test_the_velocity_converges_spectrally_with_the_points() -> None:
 
 def test_membranes_do_not_stretch() -> None:
     scene = suspension(8, 64, 1e-6)
-    sums = Suspension.of(scene, SERIAL)
-    motion = sums.motion(placed_state(scene))
+    sums = SummedEquation.of(scene, SERIAL)
+    motion = sums.motion(initial_ellipses(scene))
     gradient = motion.geometry.arclength_derivative(motion.velocity)
     stretching = np.sum(motion.geometry.tangents * gradient, axis=0)
     assert np.max(np.abs(stretching)) < 100 * sums.inextensibility.tolerance * np.max(np.abs(gradient))
@@ -109,12 +109,12 @@ def test_membranes_do_not_stretch() -> None:
 
 def test_the_last_tension_is_where_the_iteration_begins() -> None:
     scene = suspension(8)
-    sums, state = Suspension.of(scene, SERIAL), placed_state(scene)
+    sums, state = SummedEquation.of(scene, SERIAL), initial_ellipses(scene)
     sums.rate(state)
     first = sums.inextensibility.iterations
     rate = sums.rate(state)
     assert sums.inextensibility.iterations <= first + 1
-    fresh = Suspension.of(scene, SERIAL).rate(state)
+    fresh = SummedEquation.of(scene, SERIAL).rate(state)
     left_over = 10 * sums.inextensibility.tolerance * np.max(np.abs(fresh))
     np.testing.assert_allclose(rate, fresh, rtol=0, atol=left_over)
 
@@ -124,8 +124,8 @@ def test_blocks_of_the_jacobian_are_those_of_vesicles_far_from_the_others() -> N
         Vesicle(reduced_area=0.8 + 0.05 * k, center=(40.0 * k, 1.0), angle=0.7 * k) for k in range(3)
     )
     scene = Scene(horizon=1.0, vesicles=vesicles, flow=Shear(rate=0.5))
-    state = placed_state(scene)
-    exact, found = Dynamics.of(scene).jacobian(state), Suspension.of(scene, SERIAL).jacobian(state)
+    state = initial_ellipses(scene)
+    exact, found = DenseEquation.of(scene).jacobian(state), SummedEquation.of(scene, SERIAL).jacobian(state)
     for members, block in zip(found.members, found.blocks, strict=True):
         expected = exact[np.ix_(members, members)]
         np.testing.assert_allclose(block, expected, rtol=0, atol=2e-4 * np.max(np.abs(expected)))
@@ -138,7 +138,7 @@ def test_blocks_of_the_jacobian_are_those_of_vesicles_far_from_the_others() -> N
 def test_blocks_contain_how_others_draw_a_vesicle(cutoff: float | None) -> None:
     """Against differences of the adhesion force while one vesicle is shifted."""
     scene = suspension(4, 64, 1e-9, adhesion=Adhesion(hamaker=1.0, distance=0.4, cutoff=cutoff))
-    sums, state, step = Suspension.of(scene, SERIAL), placed_state(scene), 1e-5
+    sums, state, step = SummedEquation.of(scene, SERIAL), initial_ellipses(scene), 1e-5
     assert sums.adhesion
     membranes = sums.membranes
 
@@ -157,7 +157,7 @@ def test_blocks_contain_how_others_draw_a_vesicle(cutoff: float | None) -> None:
 def scattered(count: int, points: int) -> Geometry:
     """A suspension, in which most vesicles are far from each other."""
     scene = suspension(count, points)
-    return Geometry(Membranes.of_scene(scene), placed_state(scene))
+    return Geometry(Membranes.of_scene(scene), initial_ellipses(scene))
 
 
 @pytest.mark.parametrize("accuracy", [1e-4, 1e-7, 1e-10])
@@ -208,7 +208,7 @@ def test_adhesion_between_far_vesicles_needs_few_of_their_points(
 
 def test_neighbors_are_those_found_among_all_pairs() -> None:
     scene = close_together(64)
-    geometry = Geometry(Dynamics.of(scene).membranes, placed_state(scene))
+    geometry = Geometry(DenseEquation.of(scene).membranes, initial_ellipses(scene))
     everyone, near = Closeness(geometry), Neighbors(geometry, 6.0)
     expected = np.where(everyone.distances <= 6.0, everyone.distances, np.inf)
     found = np.full_like(expected, np.inf)
@@ -224,7 +224,9 @@ def test_the_gap_is_found_however_far_apart_vesicles_are(apart: float) -> None:
         for x, y in ((0.0, 0.0), (2 + apart, 0.0), (0.0, 3 + apart))
     )
     scene = Scene(horizon=1.0, vesicles=circles)
-    assert gap(Geometry(Dynamics.of(scene).membranes, placed_state(scene))) == pytest.approx(apart, rel=1e-3)
+    assert gap(Geometry(DenseEquation.of(scene).membranes, initial_ellipses(scene))) == pytest.approx(
+        apart, rel=1e-3
+    )
 
 
 # --- In time ----------------------------------------------------------------------------------------------
@@ -232,12 +234,12 @@ def test_the_gap_is_found_however_far_apart_vesicles_are(apart: float) -> None:
 
 def test_steps_with_blocks_converge_to_those_with_the_whole_jacobian() -> None:
     scene = suspension(4, 32, 1e-7)
-    state = placed_state(scene)
-    whole = Dynamics.of(scene)
+    state = initial_ellipses(scene)
+    whole = DenseEquation.of(scene)
     exact = all_steps(BackwardDifferentiation(whole.rate, whole.jacobian, state, 1e-8, 0.5), 0.5)[-1].state
     errors = []
     for tolerance in (1e-3, 1e-5):
-        sums = Suspension.of(scene, SERIAL)
+        sums = SummedEquation.of(scene, SERIAL)
         steps = all_steps(BlockBackwardDifferentiation(sums.rate, sums.jacobian, state, tolerance, 0.5), 0.5)
         errors.append(np.max(np.abs(steps[-1].state - exact)))
     assert errors[0] < 3e-2
@@ -246,8 +248,8 @@ def test_steps_with_blocks_converge_to_those_with_the_whole_jacobian() -> None:
 
 def test_deferred_correction_keeps_its_order_with_blocks() -> None:
     scene = suspension(4, 16, 1e-9, adhesion=None)
-    sums = Suspension.of(scene, SERIAL)
-    formulas = BlockBackwardDifferentiation(sums.rate, sums.jacobian, placed_state(scene), 1e-4, 0.5)
+    sums = SummedEquation.of(scene, SERIAL)
+    formulas = BlockBackwardDifferentiation(sums.rate, sums.jacobian, initial_ellipses(scene), 1e-4, 0.5)
     state = all_steps(formulas, 0.5)[-1].state
 
     def final(order: int, count: int) -> Array:
@@ -274,11 +276,11 @@ def test_the_same_scene_gives_the_same_run_twice() -> None:
 
 def test_few_vesicles_have_matrices_and_many_have_sums() -> None:
     few, many = suspension(LARGEST_DENSE), suspension(LARGEST_DENSE + 1)
-    assert isinstance(equation_of_motion(few, SERIAL), Dynamics)
-    assert isinstance(equation_of_motion(many, SERIAL), Suspension)
+    assert isinstance(equation_of_motion(few, SERIAL), DenseEquation)
+    assert isinstance(equation_of_motion(many, SERIAL), SummedEquation)
     first = many.vesicles[0].model_copy(update={"viscosity_contrast": 2.0})
     thick = many.model_copy(update={"vesicles": (first, *many.vesicles[1:])})
-    assert isinstance(equation_of_motion(thick, SERIAL), Dynamics)
+    assert isinstance(equation_of_motion(thick, SERIAL), DenseEquation)
 
 
 def test_terms_that_a_scene_lacks_are_never_constructed(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -289,9 +291,9 @@ def test_terms_that_a_scene_lacks_are_never_constructed(monkeypatch: pytest.Monk
     monkeypatch.setattr(summed_module, "TruncatedAdhesion", refuse)
     monkeypatch.setattr(summed_module, "imposed_flow", refuse)
     scene = suspension(LARGEST_DENSE + 1, adhesion=None, flow=None)
-    sums = Suspension.of(scene, SERIAL)
-    sums.rate(placed_state(scene))
-    sums.jacobian(placed_state(scene))
+    sums = SummedEquation.of(scene, SERIAL)
+    sums.rate(initial_ellipses(scene))
+    sums.jacobian(initial_ellipses(scene))
 
 
 @pytest.mark.parametrize(
@@ -305,7 +307,7 @@ def test_a_cutoff_is_constructed_where_there_is_one(
 
     monkeypatch.setattr(summed_module, needless, refuse)
     adhesion = Adhesion(hamaker=1.0, distance=0.4, cutoff=cutoff)
-    assert Suspension.of(suspension(LARGEST_DENSE + 1, adhesion=adhesion), SERIAL).adhesion
+    assert SummedEquation.of(suspension(LARGEST_DENSE + 1, adhesion=adhesion), SERIAL).adhesion
 
 
 def test_beyond_the_cutoff_many_vesicles_feel_nothing() -> None:

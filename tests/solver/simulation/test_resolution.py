@@ -15,11 +15,11 @@ from solver import Outcome, Run, Scene
 from solver.analysis.run import Frames
 from solver.membrane.curve import positions
 from solver.membrane.geometry import Geometry, Membranes
-from solver.motion.dense import Dynamics
+from solver.motion.dense import DenseEquation
 from solver.parallel import Parallel
 from solver.scene import Adhesion, Criteria, Numerics, Output, Shear, Start, Trap, Vesicle
 from solver.simulation import simulate as time_loop
-from solver.simulation.initial_state import placed_state
+from solver.simulation.initial_state import initial_ellipses
 from solver.simulation.resolution import (
     LADDER,
     AdaptiveResolution,
@@ -145,7 +145,7 @@ def test_the_ladder_has_an_end() -> None:
 def rough(scene: Scene, points: int, amplitude: float) -> tuple[Membranes, Array]:
     """The start with a wave of this amplitude in the last third of the tangent angle's spectrum."""
     given = with_points(scene, points)
-    membranes, state = Membranes.of_scene(given), placed_state(given)
+    membranes, state = Membranes.of_scene(given), initial_ellipses(given)
     alpha = 2 * np.pi * np.arange(points) / points
     wave = np.tile(amplitude * np.cos((points // 2 - 2) * alpha), membranes.count)
     state[: wave.size] += wave
@@ -203,7 +203,7 @@ def test_a_fixed_number_is_never_raised() -> None:
 
 def test_membranes_need_a_number_of_points() -> None:
     with pytest.raises(ValueError, match="'auto'"):
-        Dynamics.of(adaptive(alone(0.9)))
+        DenseEquation.of(adaptive(alone(0.9)))
 
 
 # Carrying a state.
@@ -237,7 +237,7 @@ def test_the_highest_mode_is_carried_as_the_wave_it_is() -> None:
 def test_a_carried_start_is_the_same_curve() -> None:
     scene = uneven_pair()
     coarse, fine = (Membranes.of_scene(with_points(scene, n)) for n in (192, 384))
-    state = placed_state(with_points(scene, 192))
+    state = initial_ellipses(with_points(scene, 192))
     finer = Geometry(fine, carried(coarse, state, fine))
     np.testing.assert_allclose(finer.points[:, :, ::2], Geometry(coarse, state).points, rtol=0, atol=1e-13)
 
@@ -284,14 +284,14 @@ def _moments(scene: Scene, frames: Frames) -> Array:
 
 
 def test_the_work_of_all_parts_adds_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    made: list[Dynamics] = []
-    original = Dynamics.of
+    made: list[DenseEquation] = []
+    original = DenseEquation.of
 
-    def of(scene: Scene, parallel: Parallel) -> Dynamics:
+    def of(scene: Scene, parallel: Parallel) -> DenseEquation:
         made.append(original(scene, parallel))
         return made[-1]
 
-    monkeypatch.setattr(Dynamics, "of", of)
+    monkeypatch.setattr(DenseEquation, "of", of)
     script = scripted(monkeypatch, 32, {0.5: 48, 1.0: 64})
     run = simulate(fixed(shear_pair(1.5, **fixed_horizon(2.0)), 32))
     assert [dynamics.membranes.points for dynamics in made] == [32, 48, 64]

@@ -1,0 +1,34 @@
+"""Resolution in space and time, as a scene describes it."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from solver.scene.model import Model
+
+
+class Numerics(Model):
+    """Resolution in space and time."""
+
+    # On each vesicle; "auto": as many as the tolerance needs, and more when a run comes to need them.
+    points: Annotated[int, Field(ge=16, le=1024, multiple_of=2)] | Literal["auto"] = 64
+    tolerance: float = Field(1e-4, ge=1e-12, le=0.1)  # local error of tangent angle and center, absolute
+    integrator: Literal["auto", "bdf", "rosenbrock", "sdc", "imex-euler"] = "auto"
+    order: int | None = Field(None, ge=2, le=8)  # of "sdc"; None: its usual one
+    # By the estimated error of each step, or as the paper: by the drift of areas and lengths over the run.
+    step_control: Literal["embedded", "area-length"] = "embedded"
+    work_limit: int = Field(1_000_000, ge=1)  # evaluations after which a run is given up
+
+    @model_validator(mode="after")
+    def _options_of_the_integrator(self) -> Self:
+        if self.order is not None and self.integrator != "sdc":
+            raise ValueError(
+                f"order can be chosen for integrator 'sdc' only, got {self.order} with {self.integrator!r}"
+            )
+        if self.step_control == "area-length" and self.integrator not in ("sdc", "imex-euler"):
+            raise ValueError(
+                f"step_control 'area-length' needs integrator 'sdc' or 'imex-euler', got {self.integrator!r}"
+            )
+        return self
