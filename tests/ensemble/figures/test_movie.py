@@ -10,11 +10,11 @@ import imageio_ffmpeg
 import numpy as np
 import pytest
 from PIL import Image
-from tests.ensemble.test_figures import orbit
 
 from ensemble.figures.movie import Picture, picture_times, save_movie
 from solver.analysis.run import Frames, Run
 from solver.membrane.curve import positions
+from tests.ensemble.made_runs import orbit
 from tests.ensemble.runs import failed_run
 
 HOLD = 1.0

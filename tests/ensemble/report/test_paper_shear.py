@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.special import gamma
-from tests.ensemble.test_figures import orbit
 
 from ensemble.figures import save
 from ensemble.report.paper import critical_hamaker, exponents, shear, unequal, viscosity
@@ -25,6 +24,7 @@ from ensemble.search.boundary import Boundary, BoundaryPoint
 from ensemble.store import Store
 from solver.analysis.run import Energy, Outcome, Run, Viscosity
 from solver.scene import Scene
+from tests.ensemble.made_runs import orbit
 
 SECTIONS = (shear.SECTION, critical_hamaker.SECTION, viscosity.SECTION, exponents.SECTION, unequal.SECTION)
 PERIOD = 36.5
