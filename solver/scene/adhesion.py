@@ -6,7 +6,7 @@ from typing import Self
 
 from pydantic import model_validator
 
-from solver.scene.model import Model, NonNegative, Positive
+from solver.model import Model, NonNegative, Positive
 
 
 class Adhesion(Model):

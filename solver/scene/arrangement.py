@@ -12,9 +12,9 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
+from solver.model import Model, Positive
 from solver.scene.distribution import Distribution, Normal, Uniform, drawn, ends
 from solver.scene.ellipses import semi_axes
-from solver.scene.model import Model, Positive
 from solver.scene.placement import placed_at_random
 from solver.scene.vesicle import Vesicle
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from solver.scene.model import Model, NonNegative, Positive
+from solver.model import Model, NonNegative, Positive
 
 
 class Criteria(Model):

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Discriminator, Tag, model_validator
 
-from solver.scene.model import Model, NonNegative
+from solver.model import Model, NonNegative
 
 Array = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from solver.scene.model import Model, NonNegative
+from solver.model import Model, NonNegative
 
 
 class Shear(Model):

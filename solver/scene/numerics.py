@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from solver.scene.model import Model
+from solver.model import Model
 
 
 class Numerics(Model):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from solver.scene.model import Model, Positive
+from solver.model import Model, Positive
 
 
 class Start(Model):

@@ -6,7 +6,7 @@ import math
 
 from pydantic import Field
 
-from solver.scene.model import Model, Positive
+from solver.model import Model, Positive
 
 
 class Vesicle(Model):
