@@ -15,6 +15,10 @@ from typing import Any
 import pytest
 
 from tests import postgresql
+from tests.processor_time import ProcessorTimes
+
+# Before anything imports NumPy: the tests run in several processes, whose threads would fight for the processors.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 ENSEMBLE = (sys.executable, "-m", "ensemble")
 SECONDS = 240
@@ -26,6 +30,11 @@ QUICK_STUDY = (
     "--set=scene.numerics.tolerance=1e-3",
     "--tolerance=0.1",
 )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Measure what the tests cost."""
+    config.pluginmanager.register(ProcessorTimes(config.getoption("durations")))
 
 
 @dataclass(frozen=True)
