@@ -99,10 +99,11 @@ def test_the_wheel_ships_exactly_the_packages(wheel: set[str]) -> None:
 
 
 def test_the_wheel_ships_every_module_and_preset(wheel: set[str]) -> None:
+    data = ("py.typed", "presets/*.toml", "report/paper/*.toml", "migrations/*.mako", "static/**/*")
     sources = {
         path.relative_to(ROOT).as_posix()
         for package in PACKAGES
-        for pattern in ("*.py", "presets/*.toml", "report/paper/*.toml", "migrations/*.mako", "static/**/*")
+        for pattern in ("*.py", *data)
         for path in (ROOT / package).rglob(pattern)
         if path.is_file()
     }
