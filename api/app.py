@@ -17,7 +17,7 @@ from api.http.openapi import complete
 from api.http.page import add_page
 from api.http.service import Service
 from api.routes import boundaries, health, jobs, metrics, presets, runs
-from ensemble.store.run_key import DISTRIBUTION
+from ensemble.config.run_key import DISTRIBUTION
 
 # What any route that asks who is there, or reads what was sent, may answer with.
 REFUSALS = problems.documented(

@@ -12,9 +12,9 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict
 
 from ensemble.config.overrides import override
+from ensemble.config.run_key import run_key
 from ensemble.config.study import Study, preset_document, validated
 from ensemble.errors import BadInput, EnsembleError
-from ensemble.store.run_key import run_key
 from ensemble.timestamp import Timestamp
 from solver.scene import Scene
 

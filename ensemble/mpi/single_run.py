@@ -7,11 +7,11 @@ from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ensemble.config.run_key import run_key
 from ensemble.config.study import load_scene
 from ensemble.errors import refusing
 from ensemble.mpi.groups import chosen_ranks, split
 from ensemble.mpi.world import abort_guard, launched_size, on_root, world
-from ensemble.store.run_key import run_key
 from ensemble.store.run_record import RunSummary
 from solver.scene import Scene
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from ensemble.config.run_key import run_key
 from ensemble.config.study import load_scene, load_study
 from ensemble.report.methods import Method, Plan
 from ensemble.report.report_model import Document
 from ensemble.report.runs import Runs
-from ensemble.store.run_key import run_key
 from solver.analysis.run import Outcome
 from solver.scene import Scene
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from ensemble.config.run_key import run_key
 from ensemble.report.report_progress import Tell
 from ensemble.store import Store
-from ensemble.store.run_key import run_key
 from ensemble.store.run_record import RunSummary
 from solver.analysis.run import Run
 from solver.scene import Scene, Start

@@ -8,10 +8,10 @@ from enum import StrEnum
 
 import numpy as np
 
+from ensemble.config.run_key import run_key
 from ensemble.report.machine import Machine
 from ensemble.report.report_model import Document
 from ensemble.report.runs import Runs
-from ensemble.store.run_key import run_key
 from solver.analysis.run import LARGEST_SPATIAL, Outcome, Run
 from solver.scene import Scene
 

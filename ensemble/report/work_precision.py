@@ -7,6 +7,7 @@ from itertools import groupby
 
 import numpy as np
 
+from ensemble.config.run_key import run_key
 from ensemble.report.answers import Answer, Critical, answers, critical_values
 from ensemble.report.envelope import Envelope, envelopes
 from ensemble.report.machine import Machine
@@ -15,7 +16,6 @@ from ensemble.report.methods import Method, Plan
 from ensemble.report.report_model import Document
 from ensemble.report.runs import Runs
 from ensemble.report.shape import final_membranes, shape_distance
-from ensemble.store.run_key import run_key
 from solver.analysis.run import Array, Outcome, Run
 from solver.scene import Scene
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
+from ensemble.config.run_key import run_key
 from ensemble.search.task_queue import Task
-from ensemble.store.run_key import run_key
 from solver.analysis.outcome import latest_time
 from solver.analysis.run import Outcome
 from solver.scene import Scene

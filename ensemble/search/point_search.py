@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
+from ensemble.config.run_key import run_key
 from ensemble.search.critical_value import Side
 from ensemble.search.task_queue import Task
-from ensemble.store.run_key import run_key
 from solver.analysis.run import Outcome
 from solver.scene import Scene
 

@@ -4,10 +4,33 @@ or a PostgreSQL server).
 A run is written to `staging/`, flushed to disk, renamed into `runs/` and then entered in the catalog.  Only
 that last step makes it exist, so a process may die at any moment: what it acknowledged is there, whole, and
 what it left behind is swept.  One lock file, held only for moments, keeps sweeping apart from committing.
+
+Names are imported on first use: a command that keeps nothing does not load the database library.
 """
 
-from ensemble.store.catalog import Record
-from ensemble.store.store import Staged, Store
-from ensemble.store.store_errors import NotStored, StoreError, StoreInputError
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ensemble.store.catalog import Record
+    from ensemble.store.store import Staged, Store
+    from ensemble.store.store_errors import NotStored, StoreError, StoreInputError
 
 __all__ = ["NotStored", "Record", "Staged", "Store", "StoreError", "StoreInputError"]
+
+_MODULES = {
+    "NotStored": "store_errors",
+    "Record": "catalog",
+    "Staged": "store",
+    "Store": "store",
+    "StoreError": "store_errors",
+    "StoreInputError": "store_errors",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _MODULES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_MODULES[name]}"), name)

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, Self
 
 from pydantic import BaseModel, ConfigDict
 
-from ensemble.store.run_key import DISTRIBUTION, run_key
+from ensemble.config.run_key import DISTRIBUTION, run_key
 from ensemble.timestamp import Timestamp, now
 from solver.analysis.run import Array, Energy, Errors, Frames, Outcome, Run, Viscosity, Work
 from solver.scene import Scene

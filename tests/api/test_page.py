@@ -14,10 +14,10 @@ import pytest
 from playwright.sync_api import Browser, ConsoleMessage, Page, expect, sync_playwright
 
 from api.auth.scope import Scope
+from ensemble.config.run_key import run_key
 from ensemble.config.study import load_study
 from ensemble.search.boundary import Boundary
 from ensemble.store import Store
-from ensemble.store.run_key import run_key
 from solver.analysis.run import Outcome, Run
 from tests.api.processes import wait_until
 from tests.api.servers import make_token, serving

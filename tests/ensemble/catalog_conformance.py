@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
+from ensemble.config.run_key import run_key
 from ensemble.search.boundary import Boundary, BoundaryPoint
 from ensemble.store import NotStored, Store, StoreInputError
-from ensemble.store.run_key import run_key
 from solver.analysis.run import Outcome
 from solver.scene import Numerics
 from tests.ensemble.runs import failed_run, quiescent_scene, shear_run, shear_scene

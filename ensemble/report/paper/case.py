@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Self
 
+from ensemble.config.run_key import run_key
 from ensemble.config.study import Study, load_scene, load_study
-from ensemble.store.run_key import run_key
 from solver.scene import Scene
 
 

@@ -31,8 +31,8 @@ from api.jobs.job import (
 )
 from api.jobs.job_queue import LEASE_SECONDS, Jobs
 from api.worker.worker_name import own_name
+from ensemble.config.run_key import run_key
 from ensemble.config.study import load_scene, load_study
-from ensemble.store.run_key import run_key
 from tests.api.accepting import accepted
 
 SCENE = preset_work("doublet-shear", {})

@@ -67,7 +67,7 @@ def test_a_study_is_called_as_its_preset(name: str) -> None:
 @pytest.mark.parametrize("name", preset_names())
 def test_every_preset_says_what_it_is_and_where_it_comes_from(name: str) -> None:
     text = (
-        Path(__file__).parents[2].joinpath("ensemble", "presets", f"{name}.toml").read_text(encoding="utf-8")
+        Path(__file__).parents[3].joinpath("ensemble", "presets", f"{name}.toml").read_text(encoding="utf-8")
     )
     comment = [line for line in text.split("\n\n")[0].splitlines() if line.startswith("# ")]
     sources = ("Quaife, Veerapaneni and Young", "Keller and Skalak")

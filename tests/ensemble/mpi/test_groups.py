@@ -153,7 +153,7 @@ import sys
 from pathlib import Path
 import solver.simulation.simulate
 from ensemble.search.task_queue import Task
-from ensemble.store.run_key import run_key
+from ensemble.config.run_key import run_key
 from ensemble.mpi.world import abort_guard, world
 from ensemble.mpi.run_study import carry_out
 from ensemble.store import Store

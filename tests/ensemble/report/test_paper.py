@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ensemble.config.run_key import run_key
 from ensemble.config.study import load_scene, load_study
 from ensemble.report.machine import Machine
 from ensemble.report.paper.case import Case, StudyCase
@@ -19,7 +20,6 @@ from ensemble.report.paper.paper_text import paper_page, paper_text
 from ensemble.report.paper.power_laws import power_law
 from ensemble.report.paper.sections import SECTIONS, chosen
 from ensemble.store import Store
-from ensemble.store.run_key import run_key
 from solver.analysis.run import Outcome
 
 CASE = Case.of("doublet-shear", {"adhesion.hamaker": 0.1, "vesicles.1.center": [1.75, 0.0]})

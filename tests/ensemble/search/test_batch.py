@@ -6,10 +6,10 @@ import json
 import sys
 from pathlib import Path
 
+from ensemble.config.run_key import run_key
 from ensemble.config.study import load_scene
 from ensemble.search.batch import Batch, expected_work
 from ensemble.store import Store
-from ensemble.store.run_key import run_key
 from solver.analysis.run import Outcome
 
 RATES = (0.3, 0.5, 0.7)

@@ -11,12 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ensemble.cli.result_tables import boundary_cells, boundary_columns
+from ensemble.config.run_key import run_key
 from ensemble.config.study import Study, load_study
 from ensemble.search.boundary import BoundaryPoint
 from ensemble.search.grid import GeometricGrid
 from ensemble.search.point_search import SearchRun
 from ensemble.search.study_planner import StudyPlanner
-from ensemble.store.run_key import run_key
 from solver.analysis.run import Outcome
 from solver.scene import Numerics, Shear
 

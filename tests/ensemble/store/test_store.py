@@ -21,8 +21,8 @@ import numpy as np
 import pytest
 import xarray
 
+from ensemble.config.run_key import run_key
 from ensemble.store import Store, StoreError, StoreInputError
-from ensemble.store.run_key import run_key
 from solver.analysis.run import Outcome, Run
 from solver.scene import Criteria, Numerics
 from solver.simulation.simulate import simulate

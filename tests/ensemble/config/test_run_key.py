@@ -13,8 +13,8 @@ from typing import Any
 
 import pytest
 
-from ensemble.store import run_key as keys
-from ensemble.store.run_key import run_key
+from ensemble.config import run_key as keys
+from ensemble.config.run_key import run_key
 from solver.scene import Scene
 from tests.ensemble.runs import quiescent_scene, shear_scene
 
@@ -91,7 +91,7 @@ def test_solver_version_is_part_of_the_key(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def test_key_is_the_same_in_another_process() -> None:
-    script = "from ensemble.store.run_key import run_key; from tests.ensemble.runs import *; print(run_key(shear_scene()))"
+    script = "from ensemble.config.run_key import run_key; from tests.ensemble.runs import *; print(run_key(shear_scene()))"
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path), "PYTHONHASHSEED": "7"}
     other = subprocess.run(
         [sys.executable, "-c", script], env=environment, capture_output=True, text=True, check=True
