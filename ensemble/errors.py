@@ -1,4 +1,4 @@
-"""What can go wrong before or beside a simulation, with one base class."""
+"""Errors that this package raises on purpose, with one base class."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 
 class EnsembleError(Exception):
-    """Base of every error that this package raises on purpose."""
+    """Base class of all errors of this package."""
 
 
 class BadInput(EnsembleError):  # noqa: N818
@@ -17,9 +17,21 @@ class BadInput(EnsembleError):  # noqa: N818
     """
 
 
+class StoreError(EnsembleError):
+    """Stored data are damaged or lost; the message says which and how."""
+
+
+class StoreInputError(BadInput, ValueError):
+    """The named store, run, boundary or filter does not exist or is not valid; the message names it."""
+
+
+class NotStored(StoreInputError):  # noqa: N818
+    """The store has no run or boundary with that key."""
+
+
 @contextmanager
 def refusing() -> Iterator[None]:
-    """Turn what the packages say about unusable input into `BadInput`."""
+    """Turn errors about unusable input (`ValueError`, `OSError`) into `BadInput`."""
     try:
         yield
     except (ValueError, OSError) as error:

@@ -12,8 +12,8 @@ from alembic import command
 from alembic.config import Config
 from sqlalchemy import Connection, Engine
 
+from ensemble.disk import locked
 from ensemble.errors import BadInput
-from ensemble.store.disk import locked
 from ensemble.store.sql_database import UNUSABLE, engine, reason
 
 MIGRATIONS = "api:database/migrations"

@@ -410,10 +410,10 @@ def export(
     store: StorePath = DEFAULT_STORE,
 ) -> None:
     """Write a run to a single HDF5 file."""
-    import ensemble.store.hdf5
+    from ensemble.store.hdf5_export import export_run
 
     with refusing(), _existing(store) as opened:
-        ensemble.store.hdf5.export(opened.summary(key), opened.load(key), file)
+        export_run(opened.summary(key), opened.load(key), file)
 
 
 def _existing(path: Path) -> Store:

@@ -18,8 +18,8 @@ from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotSpec
 from scipy.interpolate import Akima1DInterpolator
 
+from ensemble.disk import replacing
 from ensemble.figures.membranes import FEW, extension, finite_frames, membrane_segments, tension_scale
-from ensemble.figures.output import appearing
 from ensemble.figures.panels import PANELS
 from ensemble.figures.style import GRAY, INSIDE, STYLE, TENSION_COLORS, VERMILLION
 from ensemble.figures.symbols import describe
@@ -72,7 +72,7 @@ def save_movie(run: Run, path: Path) -> None:
     form = _FORMATS[path.suffix.lower()]
     # The encoder is the one that a wheel brought, whatever the machine has.
     encoder = matplotlib.RcParams({"animation.ffmpeg_path": imageio_ffmpeg.get_ffmpeg_exe()})
-    with matplotlib.rc_context(STYLE), matplotlib.rc_context(encoder), appearing(path) as unfinished:
+    with matplotlib.rc_context(STYLE), matplotlib.rc_context(encoder), replacing(path) as unfinished:
         picture = Picture(run, form.resolution)
         writer = form.writer(fps=form.rate, **form.options)
         with writer.saving(picture.figure, str(unfinished), dpi=form.resolution):

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
 import matplotlib
 from matplotlib.figure import Figure
 
+from ensemble.disk import replacing
 from ensemble.figures.style import STYLE
 
 # What a format would date its files with, blanked so that equal figures are equal files.
@@ -36,7 +35,7 @@ def save(figure: Figure, path: Path) -> None:
         For any other suffix.
     """
     suffix = suffix_among(path, FIGURE_SUFFIXES)
-    with appearing(path) as unfinished, matplotlib.rc_context(STYLE):
+    with replacing(path) as unfinished, matplotlib.rc_context(STYLE):
         figure.savefig(unfinished, metadata=_UNDATED[suffix])
 
 
@@ -53,14 +52,3 @@ def suffix_among(path: Path, suffixes: Sequence[str]) -> str:
         *others, last = suffixes
         raise ValueError(f"output: must end in {', '.join(others)} or {last}, got {path.name!r}")
     return suffix
-
-
-@contextmanager
-def appearing(path: Path) -> Iterator[Path]:
-    """Give a file to write beside ``path``, with its suffix, that takes its place once it is complete."""
-    unfinished = path.with_name(f".{os.getpid()}.{path.name}")
-    try:
-        yield unfinished
-        unfinished.replace(path)
-    finally:
-        unfinished.unlink(missing_ok=True)

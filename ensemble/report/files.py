@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from matplotlib.figure import Figure
 
+from ensemble.disk import replacing
 from ensemble.figures import save
 from ensemble.report import ReportName
 from ensemble.report.report_model import Document
@@ -45,10 +45,5 @@ def write_report(
     data = report.document.model_dump_json(indent=2)
     texts = {"report.json": data, "report.md": report.text} | dict(pages or {})
     for name, content in texts.items():
-        _replace(report.directory / name, content)
-
-
-def _replace(path: Path, text: str) -> None:
-    unfinished = path.with_name(f".{path.name}.{os.getpid()}")
-    unfinished.write_text(text, encoding="utf-8")
-    unfinished.replace(path)
+        with replacing(report.directory / name) as unfinished:
+            unfinished.write_text(content, encoding="utf-8")

@@ -13,21 +13,15 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from ensemble.errors import NotStored, StoreError, StoreInputError
+
 if TYPE_CHECKING:
     from ensemble.store.catalog import Record
     from ensemble.store.store import Staged, Store
-    from ensemble.store.store_errors import NotStored, StoreError, StoreInputError
 
 __all__ = ["NotStored", "Record", "Staged", "Store", "StoreError", "StoreInputError"]
 
-_MODULES = {
-    "NotStored": "store_errors",
-    "Record": "catalog",
-    "Staged": "store",
-    "Store": "store",
-    "StoreError": "store_errors",
-    "StoreInputError": "store_errors",
-}
+_MODULES = {"Record": "catalog", "Staged": "store", "Store": "store"}
 
 
 def __getattr__(name: str) -> Any:

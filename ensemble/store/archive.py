@@ -11,8 +11,8 @@ from pydantic import ValidationError
 from zarr.codecs import ZstdCodec
 from zarr.storage import LocalStore
 
+from ensemble.errors import StoreError
 from ensemble.store.run_record import NamedArray, RunSummary, arrays, rebuild
-from ensemble.store.store_errors import StoreError
 from solver.analysis.run import Array, Run
 
 CHUNK_BYTES = 1 << 20

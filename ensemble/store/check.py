@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from ensemble.config.run_key import DISTRIBUTION, run_key
+from ensemble.errors import StoreError
 from ensemble.store.archive import read_run, read_summary
 from ensemble.store.run_record import RunSummary
-from ensemble.store.store_errors import StoreError
 from solver.analysis.run import Outcome, Run
 
 

@@ -18,7 +18,7 @@ from sqlalchemy.orm import InstrumentedAttribute
 from sqlalchemy.sql.compiler import SQLCompiler
 from sqlalchemy.sql.functions import GenericFunction
 
-from ensemble.store.store_errors import StoreInputError
+from ensemble.errors import StoreInputError
 from ensemble.timestamp import timestamp_text
 
 COMPARISONS = {

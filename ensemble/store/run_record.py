@@ -21,8 +21,8 @@ RESULT_PACKAGES = (DISTRIBUTION, "numpy", "scipy", "numba")
 class RunSummary(BaseModel):
     """Everything about a run except its arrays.  Its JSON is the attributes of the run's files.
 
-    Results have the names, units and None of `solver.analysis.run.Run`; `series` and `vesicle_series` name the
-    recorded diagnostics, `versions` the packages that the numbers depend on.
+    Results have the names, units and None of `solver.analysis.run.Run`; `series` and `vesicle_series` name
+    the recorded diagnostics, `versions` the packages that the numbers depend on.
     """
 
     # Strings keep NaN and infinity, which a failed run may carry, inside the JSON standard.

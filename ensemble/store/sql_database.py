@@ -19,7 +19,7 @@ from sqlalchemy.engine.interfaces import DBAPIConnection
 from sqlalchemy.exc import ArgumentError, DBAPIError, NoSuchModuleError
 from sqlalchemy.pool import ConnectionPoolEntry
 
-from ensemble.store.disk import flush
+from ensemble.disk import flush, replacing
 
 CATALOG = "catalog.sqlite"
 PLACE = "catalog.json"
@@ -69,11 +69,10 @@ class Place(BaseModel):
 
 def _write_secretly(path: Path, text: str) -> None:
     """Write a file that its owner alone may read, whole or not at all."""
-    draft = path.with_suffix(".draft")
-    draft.touch(mode=0o600)
-    draft.write_text(text, encoding="utf-8")
-    flush(draft)
-    draft.rename(path)
+    with replacing(path) as unfinished:
+        unfinished.touch(mode=0o600)
+        unfinished.write_text(text, encoding="utf-8")
+        flush(unfinished)
     flush(path.parent)
 
 

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from uuid import uuid4
 
-from ensemble.store.disk import locked
+from ensemble.disk import locked
 
 LOCK = "writer.lock"
 

@@ -18,13 +18,13 @@ from typing import Self
 from pydantic import ValidationError
 from sqlalchemy.exc import DatabaseError
 
+from ensemble.disk import flush, flush_tree, locked
+from ensemble.errors import NotStored, StoreInputError
 from ensemble.search.boundary import Boundary
 from ensemble.store.catalog import Catalog, Record
-from ensemble.store.disk import flush, flush_tree, locked
 from ensemble.store.run_record import RunSummary
 from ensemble.store.sql_database import CATALOG, PLACE, UNUSABLE, Place, reason
 from ensemble.store.staging import Writer, abandoned
-from ensemble.store.store_errors import NotStored, StoreInputError
 from solver.analysis.run import Outcome, Run
 
 LOCK = "store.lock"

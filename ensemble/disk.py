@@ -1,0 +1,78 @@
+"""Files that outlive a power failure or appear complete or not at all, and locks between processes."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+
+def flush(path: Path) -> None:
+    """Make the contents of a file, or the entries of a directory, durable (fsync).
+
+    Parameters
+    ----------
+    path : Path
+        The file or directory.
+    """
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def flush_tree(root: Path) -> None:
+    """Make a directory and everything below it durable.
+
+    Parameters
+    ----------
+    root : Path
+        The directory.
+    """
+    for directory, _, names in os.walk(root, topdown=False):
+        for name in names:
+            flush(Path(directory, name))
+        flush(Path(directory))
+
+
+@contextmanager
+def locked(path: Path) -> Iterator[None]:
+    """Hold an exclusive lock against other threads and processes; it ends when its holder dies.
+
+    Parameters
+    ----------
+    path : Path
+        The lock file, which is created if it does not exist.
+    """
+    # flock belongs to the open file, so each holder opens its own.
+    descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(descriptor)
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Yield a file to write, which takes the place of ``path`` when the block ends without an error.
+
+    Parameters
+    ----------
+    path : Path
+        The file to create or replace.  Its directory exists.
+
+    Yields
+    ------
+    Path
+        A hidden file in the same directory and with the same suffix.  A killed process leaves it behind.
+    """
+    unfinished = path.with_name(f".{os.getpid()}.{path.name}")
+    try:
+        yield unfinished
+        unfinished.replace(path)
+    finally:
+        unfinished.unlink(missing_ok=True)

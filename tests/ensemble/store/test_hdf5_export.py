@@ -1,0 +1,118 @@
+"""The export of a run to one HDF5 file: exact, and whole at every moment."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from ensemble.store.hdf5_export import export_run
+from ensemble.store.run_record import RunSummary, arrays
+from solver.analysis.run import Run
+from solver.scene import Vesicle
+from tests.ensemble.runs import failed_run, shear_run, shear_scene
+
+EXPORT_FOREVER = """
+import sys
+from dataclasses import replace
+from pathlib import Path
+import numpy as np
+from ensemble.store.hdf5_export import export_run
+from ensemble.store.run_record import RunSummary
+from tests.ensemble.runs import shear_run, shear_scene
+path, number = Path(sys.argv[1]), int(sys.argv[2])
+run = shear_run(shear_scene(points=256), frames=500)
+while True:
+    number += 1
+    frames = replace(run.frames, tension=np.full_like(run.frames.tension, number))
+    numbered = replace(run, time=float(number), frames=frames)
+    export_run(RunSummary.of(numbered), numbered, path)
+    print(number, flush=True)
+"""
+
+
+def read(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    """Data sets and attributes of a file by name."""
+    with h5py.File(path, "r") as file:
+        return (
+            {name: np.asarray(data[()]) for name, data in file.items()},
+            {name: json.loads(text) for name, text in file.attrs.items()},
+        )
+
+
+@pytest.mark.parametrize("run", [shear_run(), failed_run()], ids=["shear", "failed"])
+def test_export_holds_the_whole_run(tmp_path: Path, run: Run) -> None:
+    summary = RunSummary.of(run)
+    export_run(summary, run, tmp_path / "run.h5")
+    values, attributes = read(tmp_path / "run.h5")
+    assert RunSummary.model_validate(attributes).document() == summary.document()
+    assert values.keys() == arrays(run).keys()
+    for name, array in arrays(run).items():
+        assert (values[name].dtype, values[name].shape) == (array.values.dtype, array.values.shape)
+        assert values[name].tobytes() == array.values.tobytes()
+
+
+def test_the_attributes_of_many_vesicles_exceed_64_kib(tmp_path: Path) -> None:
+    vesicles = tuple(Vesicle(center=(3.0 * number, 0.0)) for number in range(600))
+    run = shear_run(shear_scene().model_copy(update={"vesicles": vesicles}), frames=1)
+    export_run(RunSummary.of(run), run, tmp_path / "run.h5")
+    with h5py.File(tmp_path / "run.h5") as file:
+        assert len(file.attrs["scene"]) > 1 << 16
+    assert read(tmp_path / "run.h5")[1]["scene"] == run.scene.model_dump(mode="json")
+
+
+def test_export_is_readable_without_this_package(tmp_path: Path) -> None:
+    run = shear_run()
+    export_run(RunSummary.of(run), run, tmp_path / "run.h5")
+    with h5py.File(tmp_path / "run.h5") as file:
+        assert file.attrs["outcome"] == '"bound"'
+        assert file["tangent_angle"].shape == run.frames.tangent_angle.shape
+
+
+def test_failed_export_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:
+    run, path = shear_run(), tmp_path / "run.h5"
+    export_run(RunSummary.of(run), run, path)
+    before = path.read_bytes()
+    unwritable = replace(run, series=run.series | {"gap": np.array([object()])})
+    with pytest.raises(TypeError):
+        export_run(RunSummary.of(run), unwritable, path)
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_file_is_whole_whenever_its_writer_is_killed(tmp_path: Path) -> None:
+    path = tmp_path / "run.h5"
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    moment = random.Random(5)
+    acknowledged, torn = 0, 0
+    for _ in range(8):
+        command = [sys.executable, "-c", EXPORT_FOREVER, str(path), str(acknowledged)]
+        with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) as writer:
+            assert writer.stdout is not None
+            first = writer.stdout.readline()
+            time.sleep(moment.uniform(0, 0.05))
+            unfinished = path.with_name(f".{writer.pid}.{path.name}")
+            deadline = time.monotonic() + 10
+            while not unfinished.exists() and time.monotonic() < deadline:
+                pass
+            writer.kill()
+            lines = (first + writer.stdout.read()).split()
+        acknowledged = max(map(int, lines))
+        torn += unfinished.exists()
+        values, attributes = read(path)
+        # The last export may be in place although its writer had no time to say so.
+        assert attributes["time"] in (acknowledged, acknowledged + 1)
+        assert values["tension"].shape == (500, 2, 256)
+        assert (values["tension"] == attributes["time"]).all()
+        assert {entry for entry in tmp_path.iterdir() if not entry.name.startswith(".")} == {path}
+    assert torn > 0, "no writer was killed in the middle of a write"
