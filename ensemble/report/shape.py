@@ -1,9 +1,9 @@
 """How far apart two shapes are, whichever way their points are spread along them.
 
-Points move along a membrane by a choice that has no physics in it
-(`solver.membrane.tangential_velocity`), and it depends on step size and resolution.  Two runs that agree on
-every membrane may therefore disagree on every point, so runs are compared as shapes: each membrane is a closed curve, interpolated trigonometrically through its
-points, and the error at a point is its distance to the curve of the other run.
+Points move along a membrane by a choice that has no physics in it (`solver.membrane.tangential_velocity`),
+and it depends on step size and resolution. Two runs that agree on every membrane may therefore disagree on
+every point, so runs are compared as shapes: each membrane is a closed curve, interpolated trigonometrically
+through its points, and the error at a point is its distance to the curve of the other run.
 """
 
 from __future__ import annotations
