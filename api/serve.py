@@ -27,7 +27,7 @@ from api.jobs.job import preset_work
 from api.jobs.job_queue import Jobs
 from api.jobs.submissions import Submissions
 from api.settings import Settings
-from ensemble.config.study import preset_names
+from ensemble.config.documents import preset_names
 from ensemble.errors import BadInput
 from ensemble.store import Store
 from ensemble.store.sql_database import Place, is_file

@@ -14,7 +14,7 @@ from pydantic_core import ErrorDetails
 from starlette.exceptions import HTTPException
 
 from api.jobs.job import NoSuchJob
-from ensemble.config.overrides import describe
+from ensemble.config.validation import describe
 from ensemble.errors import BadInput
 from ensemble.store import NotStored
 

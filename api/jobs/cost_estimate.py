@@ -6,10 +6,10 @@ import math
 import sys
 
 from api.http.schemas import Estimate
+from ensemble.config.certifying_scene import certifying_scene
+from ensemble.config.geometric_grid import GeometricGrid
 from ensemble.config.study import Study
 from ensemble.errors import BadInput
-from ensemble.search.certification import finer
-from ensemble.search.grid import GeometricGrid
 from solver.scene import Scene
 
 # What a run may record: it is held in memory until the run ends.
@@ -70,5 +70,5 @@ def _of_study(study: Study) -> tuple[int, float]:
         cost += searching * _of_run(dearest)
         if study.search.certify:
             runs += 2
-            cost += 2 * _of_run(finer(dearest))
+            cost += 2 * _of_run(certifying_scene(dearest))
     return runs, cost

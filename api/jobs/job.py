@@ -11,9 +11,11 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict
 
+from ensemble.config.documents import preset_document
 from ensemble.config.overrides import override
 from ensemble.config.run_key import run_key
-from ensemble.config.study import Study, preset_document, validated
+from ensemble.config.study import Study
+from ensemble.config.validation import validated
 from ensemble.errors import BadInput, EnsembleError
 from ensemble.timestamp import Timestamp
 from solver.scene import Scene

@@ -18,8 +18,8 @@ from api.http.schemas import Estimate, Submission
 from api.jobs.cost_estimate import estimate
 from api.jobs.job import Kind, Work, preset_work, scene_work, study_work
 from api.jobs.size_limits import limit_scene, limit_study
+from ensemble.config.documents import preset_document
 from ensemble.config.overrides import override
-from ensemble.config.study import preset_document
 from ensemble.errors import BadInput
 
 MOST_KNOWN = 256

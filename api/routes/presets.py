@@ -9,7 +9,7 @@ from api.auth.callers import Reader
 from api.http.schemas import Page, Preset
 from api.jobs.cost_estimate import estimate
 from api.jobs.job import preset_work
-from ensemble.config.study import preset_document, preset_names
+from ensemble.config.documents import preset_document, preset_names
 from solver.scene.arrangement import Arrangement
 
 router = APIRouter(prefix="/presets", tags=["presets"])

@@ -148,12 +148,14 @@ def _prepare(
     size: int,
 ) -> tuple[Study, int]:
     """Load the study, then create or sweep the store: a study that is refused leaves no trace."""
-    from ensemble.config.study import load_study
+    from ensemble.config.documents import load_study
     from ensemble.mpi.groups import chosen_ranks
     from ensemble.store import Store
 
     with refusing():
-        loaded = load_study(study, changes, tolerance, certify)
+        more = [] if tolerance is None else [f"search.tolerance={tolerance!r}"]
+        more += ["search.certify=true"] if certify else []
+        loaded = load_study(study, [*changes, *more])
         ranks = chosen_ranks(ranks_per_run or "1", loaded.scene, size)
         Store.open(store).close()
     return loaded, ranks
@@ -270,7 +272,7 @@ def _boundary(store: Store, name: str) -> Boundary | None:
 
 
 def _draw(store: Store, shown: Boundary | str, output: Path) -> None:
-    from ensemble.config.parameters import parameter_value
+    from ensemble.config.dotted_paths import parameter_value
     from ensemble.figures import phase_diagram, run_figure, save
     from ensemble.figures.movie import MOVIE_SUFFIXES, save_movie
     from ensemble.figures.output import FIGURE_SUFFIXES, suffix_among
@@ -336,7 +338,7 @@ def _paper(only: list[str], quick: bool, store: Path, ranks_per_run: str | None)
     """Make the paper's report on all ranks; None on all but the first."""
     from rich.console import Console
 
-    from ensemble.config.study import load_scene
+    from ensemble.config.documents import load_scene
     from ensemble.mpi.groups import chosen_ranks
     from ensemble.mpi.world import abort_guard, on_root, world
     from ensemble.report.paper.make_paper import make_paper

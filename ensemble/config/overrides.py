@@ -1,40 +1,41 @@
-"""Changes to a scene or study by dotted path, and one-line messages about documents that are refused.
+"""Changes to a document by dotted path.
 
-``vesicles.reduced_area=0.8`` sets a field of every vesicle, ``vesicles.0.angle=1.0`` of the first one; the
-vesicles of an arrangement can be changed like listed ones.
+``vesicles.reduced_area=0.8`` sets a field of every vesicle, ``vesicles.0.angle=1.0`` of the first one.  The
+vesicles of an arrangement can be changed in the same way as listed ones.
 """
 
 from __future__ import annotations
 
 import copy
 import re
-import reprlib
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
-from pydantic import TypeAdapter, ValidationError
-from pydantic_core import ErrorDetails
+from pydantic import TypeAdapter
 
+from ensemble.config.dotted_paths import is_array, locations
+from ensemble.config.validation import validated
 from solver.scene import Arrangement
-
-Location = tuple[str | int, ...]
 
 _BARE_WORD = re.compile(r"[A-Za-z_][\w.-]*")
 
 
 def parse_override(text: str) -> tuple[str, Any]:
-    """Split ``path=value``, where the value is TOML or a bare word that stands for a string.
+    """Split ``path=value`` into the path and the value.
 
     Parameters
     ----------
     text : str
-        For example ``flow.rate=0.5``, ``vesicles.0.center=[1.5, 0.0]`` or ``flow.kind=shear``.
+        For example ``flow.rate=0.5``, ``vesicles.0.center=[1.5, 0.0]`` or ``flow.kind=shear``.  The value is
+        TOML, or a bare word that stands for a string.
 
     Returns
     -------
     path : str
+        Dotted path of a field.
     value : object
+        What the field becomes.
 
     Raises
     ------
@@ -55,73 +56,27 @@ def parse_override(text: str) -> tuple[str, Any]:
     return path, parsed["value"]
 
 
-def locations(document: Mapping[str, Any], path: str) -> tuple[Location, ...]:
-    """Find the places in a document that a dotted path names, whether or not they hold anything yet.
-
-    Parameters
-    ----------
-    document : mapping
-        Nested tables (mappings) and arrays (sequences), as read from TOML.
-    path : str
-        Names and array indices joined by dots.  A name met in an array stands for that name in all
-        of its elements.
-
-    Returns
-    -------
-    tuple of tuples
-        Keys and indices from the outside in, one tuple for each place.
-
-    Raises
-    ------
-    ValueError
-        If a part of the path is empty, is an index outside the array, or lies inside a plain value.
-    """
-    parts = path.split(".")
-    if not all(parts):
-        raise ValueError(f"{path!r} — expected names joined by single dots")
-    found: list[tuple[Location, Any]] = [((), document)]
-    for part in parts:
-        found = [place for location, node in found for place in _enter(location, node, part)]
-    return tuple(location for location, _ in found)
-
-
-def _enter(location: Location, node: Any, part: str) -> list[tuple[Location, Any]]:
-    if node is None:  # a table that is not there yet
-        return [((*location, part), None)]
-    if isinstance(node, Mapping):
-        return [((*location, part), node.get(part))]
-    if not _is_array(node):
-        raise ValueError(f"{dotted(location)}: {reprlib.repr(node)} — has no field {part!r}")
-    if not part.isdecimal():
-        return [
-            place for index, element in enumerate(node) for place in _enter((*location, index), element, part)
-        ]
-    index = int(part)
-    if index >= len(node):
-        raise ValueError(f"{dotted((*location, index))}: no such element, there are {len(node)}")
-    return [((*location, index), node[index])]
-
-
-def _is_array(node: Any) -> bool:
-    return isinstance(node, Sequence) and not isinstance(node, str)
-
-
 def override(document: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
     """Return a copy of a document with the values at some dotted paths replaced.
 
-    Tables on the way that do not exist are made; what the document may contain is for its model to say.
+    Tables that do not exist yet are added.  Whether the document may contain them is decided later, when its
+    model validates it.
 
     Parameters
     ----------
     document : mapping
-        As for `locations`.
+        Nested tables and arrays, as read from TOML.
     changes : mapping from dotted path to value
         Applied in order, except that an arrangement is changed before its vesicles are.
+
+    Returns
+    -------
+    dict
 
     Raises
     ------
     ValueError
-        As `locations`.
+        If a part of a path is empty, is an index outside an array, or lies inside a plain value.
     """
     changed: dict[str, Any] = _editable(document)
     for path, value in sorted(changes.items(), key=lambda change: "vesicles" in change[0].split(".")):
@@ -144,89 +99,17 @@ def _list_vesicles(document: dict[str, Any], path: str) -> None:
         if not isinstance(node, dict):
             return
         if part == "vesicles" and part not in node and node.get("arrangement") is not None:
-            arrangement = node.pop("arrangement")
             try:
-                arranged = TypeAdapter(Arrangement).validate_python(arrangement)
-            except ValidationError as error:
-                raise ValueError(f"arrangement: {explain(error, arrangement)}") from error
-            node[part] = [vesicle.model_dump() for vesicle in arranged.vesicles()]
+                arrangement = validated(TypeAdapter(Arrangement), node.pop("arrangement"))
+            except ValueError as error:
+                raise ValueError(f"arrangement: {error}") from error
+            node[part] = [vesicle.model_dump() for vesicle in arrangement.vesicles()]
         node = node.get(part)
 
 
 def _editable(node: Any) -> Any:
     if isinstance(node, Mapping):
         return {key: _editable(element) for key, element in node.items()}
-    if _is_array(node):
+    if is_array(node):
         return [_editable(element) for element in node]
     return node
-
-
-def value_at(document: Any, location: Location) -> Any:
-    """Return what a document holds at a location, None where it holds nothing."""
-    node = document
-    for key in location:
-        try:
-            node = node[key]
-        except (KeyError, IndexError, TypeError):
-            return None
-    return node
-
-
-def dotted(location: Location) -> str:
-    """Write a location as a dotted path."""
-    return ".".join(str(part) for part in location)
-
-
-def explain(error: ValidationError, document: Mapping[str, Any]) -> str:
-    """Say on one line why a document was refused: fields, offending values, what is allowed.
-
-    Parameters
-    ----------
-    error : ValidationError
-        Raised by validating the document.
-    document : mapping
-
-    Returns
-    -------
-    str
-        For example ``vesicles.0.reduced_area: 1.2 — input should be less than or equal to 1``; several
-        problems are separated by semicolons.
-    """
-    return describe(error.errors(include_url=False), document)
-
-
-def describe(problems: Sequence[ErrorDetails], document: Mapping[str, Any]) -> str:
-    """Say on one line what pydantic found wrong with a document, as `explain` does."""
-    # Refused elements make pydantic complain about the array around them, too: that is no news.
-    around = {problem["loc"][:depth] for problem in problems for depth in range(len(problem["loc"]))}
-    # What is said several times about one value are the alternatives that it could be.
-    messages: dict[str, list[str]] = {}
-    for problem in problems:
-        if problem["loc"] not in around:
-            message = problem["msg"].removeprefix("Value error, ")
-            said = messages.setdefault(_subject(problem, document), [])
-            said.append(message[:1].lower() + message[1:])
-    return "; ".join(subject + ", or ".join(said) for subject, said in messages.items())
-
-
-def _subject(problem: ErrorDetails, document: Mapping[str, Any]) -> str:
-    """What a message is about: a field, and its value."""
-    location = _without_tags(problem["loc"], document)
-    subject = f"{dotted(location)}: " if location else ""
-    # For a missing field, or a check on several, the input is the table around it: no value to show.
-    if not isinstance(problem["input"], Mapping) and problem["type"] != "missing":
-        subject += f"{reprlib.repr(problem['input'])} — "
-    return subject
-
-
-def _without_tags(location: Location, document: Mapping[str, Any]) -> Location:
-    """Drop the names of union members, which pydantic puts after values and between tables and fields."""
-    kept: list[str | int] = []
-    for part in location:
-        node = value_at(document, tuple(kept))
-        if isinstance(node, str | int | float):
-            break
-        is_tag = isinstance(node, Mapping) and part not in node and part in node.values()
-        if not is_tag:
-            kept.append(part)
-    return tuple(kept)

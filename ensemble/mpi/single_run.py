@@ -7,8 +7,8 @@ from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ensemble.config.documents import load_scene
 from ensemble.config.run_key import run_key
-from ensemble.config.study import load_scene
 from ensemble.errors import refusing
 from ensemble.mpi.groups import chosen_ranks, split
 from ensemble.mpi.world import abort_guard, launched_size, on_root, world
@@ -40,7 +40,7 @@ def single_run(
     name_or_path : str
         Of a scene.
     changes : iterable of str
-        As `ensemble.config.study.load_scene` takes them.
+        As `ensemble.config.documents.load_scene` takes them.
     store : Path or None
         Directory of the store that keeps the run.
     ranks_per_run : str or None

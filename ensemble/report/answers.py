@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from ensemble.config.documents import load_scene, load_study
 from ensemble.config.run_key import run_key
-from ensemble.config.study import load_scene, load_study
 from ensemble.report.methods import Method, Plan
 from ensemble.report.report_model import Document
 from ensemble.report.runs import Runs
+from ensemble.search.study_search import critical_value_search, expected_bracket, side_of
 from solver.analysis.run import Outcome
 from solver.scene import Scene
 
@@ -100,15 +101,18 @@ def _relative(value: float | None, converged: float) -> float | None:
 def _critical(runs: Runs, plan: Plan, tolerance: float) -> Critical:
     study = load_study(
         STUDY,
-        [f"sweep.values=[{SHEAR_RATE}]", f"scene.numerics.tolerance={tolerance!r}"],
-        tolerance=plan.bracket,
+        [
+            f"sweep.values=[{SHEAR_RATE}]",
+            f"search.tolerance={plan.bracket!r}",
+            f"scene.numerics.tolerance={tolerance!r}",
+        ],
     )
-    search = study.critical_value(study.guess_at(SHEAR_RATE, {}))
+    search = critical_value_search(study, expected_bracket(study, SHEAR_RATE, {}))
     keys, seconds = [], 0.0
     while (value := search.ask()) is not None:
         scene = study.scene_at(SHEAR_RATE, value)
         run = runs.summary(scene, f"critical adhesion: tolerance {tolerance:g}, H = {value:.5g}")
-        search.tell(value, study.side(run.outcome))
+        search.tell(value, side_of(study, run.outcome))
         keys.append(run.key)
         seconds += run.wall_seconds
     return Critical(

@@ -1,9 +1,5 @@
 """Certification of a converged search: both ends of its bracket are run again at finer numerics.
 
-Finer means, here and nowhere else, `POINTS_FACTOR` times as many points on a vesicle and a tolerance in time
-`TOLERANCE_FACTOR` times smaller.  Where the tolerance chooses the points, the smaller one does: the numerics
-must follow from the scene alone, and not from how many points a run has ended with.
-
 An end that does not come out on its side again is moved outward, one value of the grid at a time and at the
 finer numerics, until one does: the bracket only ever widens, so it holds the critical value at both numerics.
 Each end depends on nothing but the outcomes along its own way, hence the certified bracket, like that of the
@@ -18,45 +14,8 @@ from collections.abc import Iterator
 from enum import StrEnum
 from itertools import takewhile
 
-from pydantic import ValidationError
-
-from ensemble.config.overrides import explain
+from ensemble.config.geometric_grid import GeometricGrid
 from ensemble.search.critical_value import Side, Status
-from ensemble.search.grid import GeometricGrid
-from solver.scene import Numerics, Scene
-
-POINTS_FACTOR = 2
-TOLERANCE_FACTOR = 10
-
-
-def finer(scene: Scene) -> Scene:
-    """Return the scene at the numerics that certify it.
-
-    Parameters
-    ----------
-    scene : Scene
-
-    Returns
-    -------
-    Scene
-        With `POINTS_FACTOR` times the points, unless the tolerance chooses them, and 1/`TOLERANCE_FACTOR` of
-        the tolerance; else the same.
-
-    Raises
-    ------
-    ValueError
-        If that is finer than numerics can be; names the field and what it allows.
-    """
-    numerics = scene.numerics
-    points = numerics.points
-    document = numerics.model_dump() | {
-        "points": points if points == "auto" else points * POINTS_FACTOR,
-        "tolerance": numerics.tolerance / TOLERANCE_FACTOR,
-    }
-    try:
-        return scene.model_copy(update={"numerics": Numerics.model_validate(document)})
-    except ValidationError as error:
-        raise ValueError(f"to certify, numerics.{explain(error, document)}") from error
 
 
 class CertificationResult(StrEnum):

@@ -1,8 +1,8 @@
 """Search for a critical value: where the outcome of runs changes side.  Pure: no MPI, no files, no clock.
 
 The search hands out values to try (`CriticalValueSearch.ask`) and takes answers in any order
-(`CriticalValueSearch.tell`).  Its final bracket depends only on the side of every value, not on how, by how many
-workers or in which order the answers were found:
+(`CriticalValueSearch.tell`).  Its final bracket depends only on the side of every value, not on how, by how
+many workers or in which order the answers were found:
 
 - Values lie on a grid, and where all runs are decided the bracket ends as two neighbors on it.
 - Runs without an answer (undecided, failed) are worked around.  Their zone is closed in from both sides
@@ -21,7 +21,7 @@ from enum import StrEnum
 from itertools import pairwise
 from typing import Protocol
 
-from ensemble.search.grid import GeometricGrid
+from ensemble.config.geometric_grid import GeometricGrid
 
 # Numerical failures may be isolated, so one of them is not yet the edge of a zone that has no answers.
 ZONE_EDGE = 3

@@ -6,13 +6,19 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 
-from ensemble.config.parameters import parameter_value
+from ensemble.config.certifying_scene import certifying_scene
+from ensemble.config.dotted_paths import parameter_value
 from ensemble.config.study import Study
 from ensemble.search.boundary import Boundary, BoundaryPoint
-from ensemble.search.certification import Certification, CertificationResult, finer
+from ensemble.search.certification import Certification, CertificationResult
 from ensemble.search.critical_value import CriticalValueSearch, Status
-from ensemble.search.grid import GeometricGrid
 from ensemble.search.point_search import PointSearch, SearchRun
+from ensemble.search.study_search import (
+    certification_of,
+    critical_value_search,
+    expected_bracket,
+    side_of,
+)
 from ensemble.timestamp import now
 from solver.analysis.run import Outcome
 from solver.scene import Scene
@@ -44,10 +50,12 @@ class StudyPlanner:
     ) -> None:
         self._study = study
         self._known = known
-        grid = GeometricGrid(study.search.tolerance)
+        grid = study.search.grid
         self._values = {grid.value(index) for index in grid.within(*study.search.limits)}
         self._searches = {
-            at: PointSearch(study.critical_value(), at, partial(study.scene_at, at), study.side, known)
+            at: PointSearch(
+                critical_value_search(study), at, partial(study.scene_at, at), partial(side_of, study), known
+            )
             for at in study.sweep.values
         }
         self._certifications: dict[float, PointSearch[Certification]] = {}
@@ -128,7 +136,7 @@ class StudyPlanner:
 
     def _next_of(self, point_search: _AnyPointSearch) -> SearchRun | None:
         if isinstance(point_search.search, CriticalValueSearch) and point_search.untouched:
-            guess = self._study.guess_at(point_search.sweep_value, self._converged())
+            guess = expected_bracket(self._study, point_search.sweep_value, self._converged())
             if guess is not None:
                 point_search.search.reseed(guess)
         return point_search.next_task()
@@ -154,10 +162,10 @@ class StudyPlanner:
             return None
         if at not in self._certifications:
             self._certifications[at] = PointSearch(
-                self._study.certification(bracket),
+                certification_of(self._study, bracket),
                 at,
-                lambda value: finer(self._study.scene_at(at, value)),
-                self._study.side,
+                lambda value: certifying_scene(self._study.scene_at(at, value)),
+                partial(side_of, self._study),
                 self._known,
             )
             self._certifications[at].take_all_known()
@@ -188,7 +196,7 @@ class StudyPlanner:
             if ends is not None:
                 bracket, outcomes = ends, certification.outcomes(ends)
                 if verdict is CertificationResult.CONVERGED:
-                    certified_by = finer(self._study.scene_at(at, ends[0])).numerics
+                    certified_by = certifying_scene(self._study.scene_at(at, ends[0])).numerics
         return BoundaryPoint(
             parameters={self._study.sweep.parameter: at},
             bracket=bracket,

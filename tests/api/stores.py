@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import UTC, datetime
 from pathlib import Path
 
-from ensemble.config.study import load_study
+from ensemble.config.documents import load_study
 from ensemble.search.boundary import Boundary, BoundaryPoint
 from ensemble.store import Store
 from solver.analysis.run import Outcome

@@ -15,7 +15,7 @@ import pytest
 from api.auth.scope import Scope
 from api.client import Client, Refused
 from api.jobs.job import Job, Status
-from ensemble.config.study import load_scene, load_study
+from ensemble.config.documents import load_scene, load_study
 from ensemble.store import Store
 from solver.analysis.run import Outcome
 from solver.membrane.curve import positions

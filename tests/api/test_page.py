@@ -14,8 +14,8 @@ import pytest
 from playwright.sync_api import Browser, ConsoleMessage, Page, expect, sync_playwright
 
 from api.auth.scope import Scope
+from ensemble.config.documents import load_study
 from ensemble.config.run_key import run_key
-from ensemble.config.study import load_study
 from ensemble.search.boundary import Boundary
 from ensemble.store import Store
 from solver.analysis.run import Outcome, Run

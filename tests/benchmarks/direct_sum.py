@@ -22,7 +22,7 @@ from numba import njit
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from ensemble.config.study import load_scene
+from ensemble.config.documents import load_scene
 from solver.motion.dense import DenseEquation
 from solver.potentials.direct_sum import velocity
 from solver.simulation.simulate import simulate

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Self
 
+from ensemble.config.documents import load_scene, load_study
 from ensemble.config.run_key import run_key
-from ensemble.config.study import Study, load_scene, load_study
+from ensemble.config.study import Study
 from solver.scene import Scene
 
 

@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from scipy.optimize import linprog
 
-from ensemble.config.parameters import parameter_value
+from ensemble.config.dotted_paths import parameter_value
 from ensemble.report.paper import boundary_figures
 from ensemble.report.paper.boundary_figures import Diagram
 from ensemble.report.paper.case import StudyCase

@@ -31,8 +31,8 @@ from api.jobs.job import (
 )
 from api.jobs.job_queue import LEASE_SECONDS, Jobs
 from api.worker.worker_name import own_name
+from ensemble.config.documents import load_scene, load_study
 from ensemble.config.run_key import run_key
-from ensemble.config.study import load_scene, load_study
 from tests.api.accepting import accepted
 
 SCENE = preset_work("doublet-shear", {})
@@ -81,8 +81,8 @@ def leased(jobs: Jobs, worker: str = "worker") -> Lease:
 def test_a_preset_becomes_the_study_or_the_scene_of_the_command_line():
     study = preset_work("critical-hamaker", {"search.tolerance": 0.1})
     assert (study.kind, study.name) == (Kind.STUDY, "critical-hamaker")
-    assert study.model == load_study("critical-hamaker", tolerance=0.1)
-    assert study.key == load_study("critical-hamaker", tolerance=0.1).key
+    assert study.model == load_study("critical-hamaker", ["search.tolerance=0.1"])
+    assert study.key == load_study("critical-hamaker", ["search.tolerance=0.1"]).key
     scene = preset_work("doublet-shear", {"flow.rate": 0.7})
     assert (scene.kind, scene.name) == (Kind.SCENE, "doublet-shear")
     assert scene.key == run_key(load_scene("doublet-shear", ["flow.rate=0.7"]))
@@ -94,7 +94,9 @@ def test_documents_take_changes_too():
     assert scene_work(scene, {"flow.rate": 0.7}).model == load_scene("doublet-shear", ["flow.rate=0.7"])
     study = load_study("critical-hamaker")
     assert study_work(study, {}).model is study
-    assert study_work(study, {"search.certify": True}).model == load_study("critical-hamaker", certify=True)
+    assert study_work(study, {"search.certify": True}).model == load_study(
+        "critical-hamaker", ["search.certify=true"]
+    )
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from api.database.service_database import Database
 from api.jobs.job import Status
 from api.jobs.job_queue import Jobs
 from api.settings import Settings
-from ensemble.config.study import load_scene, load_study, preset_names
+from ensemble.config.documents import load_scene, load_study, preset_names
 from tests.api.servers import client_of, make_token, serving
 
 SECONDS = 20

@@ -8,7 +8,9 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from ensemble.config.overrides import explain, locations, override, parse_override
+from ensemble.config.dotted_paths import locations
+from ensemble.config.overrides import override, parse_override
+from ensemble.config.validation import explain
 from solver.scene import Scene
 
 DOUBLET: dict[str, Any] = {

@@ -91,7 +91,11 @@ def test_solver_version_is_part_of_the_key(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def test_key_is_the_same_in_another_process() -> None:
-    script = "from ensemble.config.run_key import run_key; from tests.ensemble.runs import *; print(run_key(shear_scene()))"
+    script = (
+        "from ensemble.config.run_key import run_key\n"
+        "from tests.ensemble.runs import shear_scene\n"
+        "print(run_key(shear_scene()))"
+    )
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path), "PYTHONHASHSEED": "7"}
     other = subprocess.run(
         [sys.executable, "-c", script], env=environment, capture_output=True, text=True, check=True

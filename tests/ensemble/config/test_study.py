@@ -13,9 +13,11 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 from scipy.special import ellipe
 
-from ensemble.config.study import Study, load_scene, load_study, preset_names
+from ensemble.config.documents import load_scene, load_study, preset_names
+from ensemble.config.geometric_grid import GeometricGrid
+from ensemble.config.study import Study
 from ensemble.search.critical_value import Side, Status
-from ensemble.search.grid import GeometricGrid
+from ensemble.search.study_search import critical_value_search, expected_bracket, side_of
 from solver.analysis.run import Outcome
 from solver.scene import Adhesion, Scene, Shear, Trap
 
@@ -126,7 +128,7 @@ def test_scene_at_sets_both_parameters_and_nothing_else() -> None:
 
 
 def test_sides_of_outcomes() -> None:
-    assert {outcome: HAMAKER.side(outcome) for outcome in Outcome} == {
+    assert {outcome: side_of(HAMAKER, outcome) for outcome in Outcome} == {
         Outcome.BOUND: Side.HIGH,
         Outcome.SEPARATED: Side.LOW,
         Outcome.FAILED: Side.FAILED,
@@ -137,8 +139,8 @@ def test_sides_of_outcomes() -> None:
         Outcome.TUMBLING: Side.UNDECIDED,
     }
     trap = load_study("critical-extension-rate")
-    assert trap.side(Outcome.BOUND) is Side.LOW
-    assert trap.side(Outcome.END_TO_END) is trap.side(Outcome.SEPARATED) is Side.HIGH
+    assert side_of(trap, Outcome.BOUND) is Side.LOW
+    assert side_of(trap, Outcome.END_TO_END) is side_of(trap, Outcome.SEPARATED) is Side.HIGH
 
 
 def test_a_whole_study_on_a_known_boundary_takes_few_runs() -> None:
@@ -146,7 +148,7 @@ def test_a_whole_study_on_a_known_boundary_takes_few_runs() -> None:
     runs = []
     for rate in HAMAKER.sweep.values:
         critical = 0.10 + 0.571 * rate  # the published fit
-        search = HAMAKER.critical_value(HAMAKER.guess_at(rate, known))
+        search = critical_value_search(HAMAKER, expected_bracket(HAMAKER, rate, known))
         asked = 0
         while (value := search.ask()) is not None:
             search.tell(value, Side.LOW if value < critical else Side.HIGH)
@@ -164,21 +166,21 @@ def test_a_whole_study_on_a_known_boundary_takes_few_runs() -> None:
 
 
 def test_a_guess_without_neighbors_is_the_study_s_own() -> None:
-    assert HAMAKER.guess_at(0.25, {}) == (0.2, 0.3)
-    low, high = HAMAKER.guess_at(0.75, {}) or (0.0, 0.0)  # between those at 0.5 and 1.0
+    assert expected_bracket(HAMAKER, 0.25, {}) == (0.2, 0.3)
+    low, high = expected_bracket(HAMAKER, 0.75, {}) or (0.0, 0.0)  # between those at 0.5 and 1.0
     assert 0.3 < low < 0.5 < high < 0.7
 
 
 def test_a_known_point_replaces_the_guess_there() -> None:
-    assert HAMAKER.guess_at(0.5, {0.5: (0.36, 0.37)}) == (0.36, 0.37)
-    low, high = HAMAKER.guess_at(0.75, {0.5: (1.0, 1.0)}) or (0.0, 0.0)
+    assert expected_bracket(HAMAKER, 0.5, {0.5: (0.36, 0.37)}) == (0.36, 0.37)
+    low, high = expected_bracket(HAMAKER, 0.75, {0.5: (1.0, 1.0)}) or (0.0, 0.0)
     assert low < math.sqrt(0.6 * 0.7) / 2 + 1 / 2 < high
 
 
 def test_a_guess_from_one_neighbor_covers_a_constant_and_a_proportional_boundary() -> None:
     alone = load_study("critical-hamaker", ["search.guesses=[]"])
-    assert alone.guess_at(0.5, {}) is None
-    low, high = alone.guess_at(0.5, {0.25: (0.24, 0.24)}) or (0.0, 0.0)
+    assert expected_bracket(alone, 0.5, {}) is None
+    low, high = expected_bracket(alone, 0.5, {0.25: (0.24, 0.24)}) or (0.0, 0.0)
     assert low == pytest.approx(0.12)
     assert high == pytest.approx(0.48)
 
@@ -195,24 +197,25 @@ def test_a_guess_from_neighbors_holds_a_linear_boundary(
     def boundary(rate: float) -> float:
         return offset + slope * rate
 
-    low, high = HAMAKER.guess_at(at, {rate: (boundary(rate), boundary(rate)) for rate in known}) or (0.0, 0.0)
+    brackets = {rate: (boundary(rate), boundary(rate)) for rate in known}
+    low, high = expected_bracket(HAMAKER, at, brackets) or (0.0, 0.0)
     limit = HAMAKER.search.limits[1]
     assert low <= min(boundary(at), limit) <= high
     assert high < 2 * low
-    assert HAMAKER.critical_value((low, high)).ask() is not None
+    assert critical_value_search(HAMAKER, (low, high)).ask() is not None
 
 
 def test_neighbors_on_both_sides_are_preferred_to_nearer_ones_on_one() -> None:
     known = {0.8: (1.0, 1.0), 0.9: (2.0, 2.0), 1.5: (2.0, 2.0)}
-    low, high = HAMAKER.guess_at(1.0, known) or (0.0, 0.0)
+    low, high = expected_bracket(HAMAKER, 1.0, known) or (0.0, 0.0)
     assert low < 2.0 < high < 2.1
 
 
 def test_a_guess_beyond_the_limits_is_brought_back_and_usable() -> None:
-    guess = HAMAKER.guess_at(0.25, {1.0: (0.5, 0.5), 0.75: (0.1, 0.1)})
+    guess = expected_bracket(HAMAKER, 0.25, {1.0: (0.5, 0.5), 0.75: (0.1, 0.1)})
     assert guess is not None
     assert guess[0] == HAMAKER.search.limits[0]
-    assert HAMAKER.critical_value(guess).ask() is not None
+    assert critical_value_search(HAMAKER, guess).ask() is not None
 
 
 def test_the_key_depends_on_the_contents_alone() -> None:
@@ -228,7 +231,7 @@ def test_the_key_depends_on_the_contents_alone() -> None:
 
 
 def test_the_key_is_the_same_in_another_process() -> None:
-    program = "from ensemble.config.study import load_study; print(load_study('critical-hamaker').key)"
+    program = "from ensemble.config.documents import load_study; print(load_study('critical-hamaker').key)"
     other = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=120
     )
@@ -236,7 +239,7 @@ def test_the_key_is_the_same_in_another_process() -> None:
 
 
 def test_tolerance_and_overrides_reach_the_study() -> None:
-    study = load_study("critical-hamaker", ["scene.vesicles.reduced_area=0.8"], tolerance=0.05)
+    study = load_study("critical-hamaker", ["scene.vesicles.reduced_area=0.8", "search.tolerance=0.05"])
     assert study.search.tolerance == 0.05
     assert [vesicle.reduced_area for vesicle in study.scene.vesicles] == [0.8, 0.8]
 

@@ -10,7 +10,7 @@ import time
 import psutil
 import pytest
 
-from ensemble.config.study import load_scene
+from ensemble.config.documents import load_scene
 from ensemble.errors import BadInput
 from ensemble.mpi.groups import chosen_ranks
 from ensemble.mpi.scaling_model import LEAST_EFFICIENCY, MEASURED
@@ -157,7 +157,7 @@ from ensemble.config.run_key import run_key
 from ensemble.mpi.world import abort_guard, world
 from ensemble.mpi.run_study import carry_out
 from ensemble.store import Store
-from ensemble.config.study import load_scene
+from ensemble.config.documents import load_scene
 
 LONG, SHORT = (
     load_scene("vesicle-shear", ["numerics.points=32", f"horizon={horizon}", "criteria.steady_time=1e9"])

@@ -18,7 +18,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ensemble.config.study import Study, load_study
+from ensemble.config.documents import load_study
+from ensemble.config.study import Study
 from ensemble.mpi.usage import Usage
 from ensemble.search.point_search import SearchRun
 from ensemble.search.study_planner import StudyPlanner
@@ -47,7 +48,7 @@ def unknown(_: str) -> None:
 
 @pytest.fixture(scope="module")
 def study() -> Study:
-    return load_study("critical-hamaker", ["sweep.values=[0.25, 0.75, 1.5]"], tolerance=0.05)
+    return load_study("critical-hamaker", ["sweep.values=[0.25, 0.75, 1.5]", "search.tolerance=0.05"])
 
 
 def run_study(
@@ -138,7 +139,7 @@ def test_workers_get_different_searches_before_any_search_gets_two(study: Study)
 
 
 def test_the_last_search_is_cut_by_all_workers(study: Study) -> None:
-    one_point = load_study("critical-hamaker", ["sweep.values=[0.5]"], tolerance=0.01)
+    one_point = load_study("critical-hamaker", ["sweep.values=[0.5]", "search.tolerance=0.01"])
     turns = {}
     for workers in (1, 3):
         planner, turns[workers] = StudyPlanner(one_point, unknown), 0
@@ -151,7 +152,7 @@ def test_the_last_search_is_cut_by_all_workers(study: Study) -> None:
 
 
 def test_a_slow_run_near_the_critical_value_is_not_waited_for() -> None:
-    one_point = load_study("critical-hamaker", ["sweep.values=[0.5]"], tolerance=0.05)
+    one_point = load_study("critical-hamaker", ["sweep.values=[0.5]", "search.tolerance=0.05"])
     planner = StudyPlanner(one_point, unknown)
     slow = None
     while (task := planner.next_task()) is not None:
@@ -182,14 +183,17 @@ def test_failed_and_contradictory_runs_are_reported_not_averaged(study: Study) -
 
 def test_finished_searches_tell_the_later_ones_where_to_begin() -> None:
     rates = [0.25, 0.5, 0.75, 1.0, 1.25, 1.5]
-    whole = load_study("critical-hamaker", ["search.guesses=[]"], 0.01)
+    whole = load_study("critical-hamaker", ["search.guesses=[]", "search.tolerance=0.01"])
     assert list(whole.sweep.values) == rates
     together = len(run_study(StudyPlanner(whole, unknown), 1, lambda out: 0))
     apart = sum(
         len(
             run_study(
                 StudyPlanner(
-                    load_study("critical-hamaker", ["search.guesses=[]", f"sweep.values=[{rate}]"], 0.01),
+                    load_study(
+                        "critical-hamaker",
+                        ["search.guesses=[]", f"sweep.values=[{rate}]", "search.tolerance=0.01"],
+                    ),
                     unknown,
                 ),
                 1,
@@ -328,7 +332,7 @@ from pathlib import Path
 from ensemble.mpi.world import world
 from ensemble.mpi.run_study import run_study
 from ensemble.store import Store
-from ensemble.config.study import load_study
+from ensemble.config.documents import load_study
 
 def explode(snapshot):
     raise RuntimeError("the coordinator broke")

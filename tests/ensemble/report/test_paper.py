@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ensemble.config.documents import load_scene, load_study
 from ensemble.config.run_key import run_key
-from ensemble.config.study import load_scene, load_study
 from ensemble.report.machine import Machine
 from ensemble.report.paper.case import Case, StudyCase
 from ensemble.report.paper.comparison import bracket, number, words

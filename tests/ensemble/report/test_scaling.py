@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-from ensemble.config.study import load_scene
+from ensemble.config.documents import load_scene
 from ensemble.figures import save
 from ensemble.mpi.scaling_model import LEAST_EFFICIENCY, MEASURED, ScalingModel, recommended_ranks
 from ensemble.report.scaling.counting import Counted

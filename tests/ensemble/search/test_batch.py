@@ -6,8 +6,8 @@ import json
 import sys
 from pathlib import Path
 
+from ensemble.config.documents import load_scene
 from ensemble.config.run_key import run_key
-from ensemble.config.study import load_scene
 from ensemble.search.batch import Batch, expected_work
 from ensemble.store import Store
 from solver.analysis.run import Outcome
@@ -67,7 +67,7 @@ from pathlib import Path
 from ensemble.mpi.world import abort_guard, world
 from ensemble.mpi.run_study import run_batch
 from ensemble.store import Store
-from ensemble.config.study import load_scene
+from ensemble.config.documents import load_scene
 
 communicator = world()
 with abort_guard(communicator):

@@ -9,10 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ensemble.config.study import load_study
-from ensemble.search.certification import Certification, CertificationResult, finer
+from ensemble.config.certifying_scene import certifying_scene
+from ensemble.config.documents import load_study
+from ensemble.config.geometric_grid import GeometricGrid
+from ensemble.search.certification import Certification, CertificationResult
 from ensemble.search.critical_value import Side
-from ensemble.search.grid import GeometricGrid
 from solver.scene import Numerics
 
 GRID = GeometricGrid(0.05)
@@ -133,14 +134,15 @@ def test_both_ends_are_tried_at_once_and_a_lost_end_makes_the_other_pointless() 
 
 def test_finer_means_twice_the_points_and_a_tenth_of_the_tolerance() -> None:
     scene = load_study("critical-hamaker", ["scene.numerics.tolerance=1e-3"]).scene
-    fine = finer(scene)
+    fine = certifying_scene(scene)
     assert fine.numerics == Numerics(points=2 * scene.numerics.points, tolerance=1e-4)
     assert fine.model_copy(update={"numerics": scene.numerics}) == scene
 
 
 def test_points_that_the_tolerance_chooses_are_left_to_the_finer_one() -> None:
-    scene = load_study("critical-hamaker", ["scene.numerics.points=auto"], certify=True).scene
-    assert finer(scene).numerics == Numerics(points="auto", tolerance=scene.numerics.tolerance / 10)
+    scene = load_study("critical-hamaker", ["scene.numerics.points=auto", "search.certify=true"]).scene
+    numerics = certifying_scene(scene).numerics
+    assert numerics == Numerics(points="auto", tolerance=scene.numerics.tolerance / 10)
 
 
 @pytest.mark.parametrize(

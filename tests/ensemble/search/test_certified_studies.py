@@ -11,10 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ensemble.cli.result_tables import boundary_cells, boundary_columns
+from ensemble.config.documents import load_study
+from ensemble.config.geometric_grid import GeometricGrid
 from ensemble.config.run_key import run_key
-from ensemble.config.study import Study, load_study
+from ensemble.config.study import Study
 from ensemble.search.boundary import BoundaryPoint
-from ensemble.search.grid import GeometricGrid
 from ensemble.search.point_search import SearchRun
 from ensemble.search.study_planner import StudyPlanner
 from solver.analysis.run import Outcome
@@ -51,9 +52,14 @@ def unknown(_: str) -> None:
     return None
 
 
+def certified_study(sweep_values: str) -> Study:
+    changes = [f"sweep.values={sweep_values}", "search.tolerance=0.05", "search.certify=true"]
+    return load_study("critical-hamaker", changes)
+
+
 @pytest.fixture(scope="module")
 def study() -> Study:
-    return load_study("critical-hamaker", ["sweep.values=[0.25, 0.75, 1.5]"], 0.05, certify=True)
+    return certified_study("[0.25, 0.75, 1.5]")
 
 
 def run_study(
@@ -132,7 +138,9 @@ def test_what_is_known_is_never_run_again_and_changes_nothing(
 
 def test_asked_for_later_a_certification_adds_only_its_own_runs(study: Study) -> None:
     physics = TwoNumerics(shift=1.2)
-    plain = StudyPlanner(load_study("critical-hamaker", ["sweep.values=[0.25, 0.75, 1.5]"], 0.05), unknown)
+    plain = StudyPlanner(
+        load_study("critical-hamaker", ["sweep.values=[0.25, 0.75, 1.5]", "search.tolerance=0.05"]), unknown
+    )
     searched = run_study(plain, physics)
     assert not any(is_finer(task) for task in searched)
     assert {(point.certified, point.certified_by) for point in plain.boundary().points} == {(False, None)}
@@ -153,7 +161,7 @@ def test_asked_for_later_a_certification_adds_only_its_own_runs(study: Study) ->
 
 
 def test_a_point_is_its_search_until_both_ends_are_certified(study: Study) -> None:
-    one_point = load_study("critical-hamaker", ["sweep.values=[0.5]"], 0.05, certify=True)
+    one_point = certified_study("[0.5]")
     planner, physics = StudyPlanner(one_point, unknown), TwoNumerics()
     while (task := planner.next_task()) is not None and not is_finer(task):
         planner.answer(task, physics(task))
@@ -172,7 +180,9 @@ def test_a_point_is_its_search_until_both_ends_are_certified(study: Study) -> No
 
 def test_what_cannot_be_certified_says_so_and_keeps_its_bracket(study: Study) -> None:
     physics = TwoNumerics()
-    plain = StudyPlanner(load_study("critical-hamaker", ["sweep.values=[0.25, 0.75, 1.5]"], 0.05), unknown)
+    plain = StudyPlanner(
+        load_study("critical-hamaker", ["sweep.values=[0.25, 0.75, 1.5]", "search.tolerance=0.05"]), unknown
+    )
     run_study(plain, physics)
     failing = StudyPlanner(study, unknown)
     run_study(failing, lambda task: Outcome.FAILED if is_finer(task) else physics(task), 2)
@@ -205,7 +215,7 @@ def test_a_contradiction_at_the_finer_numerics_is_reported(study: Study) -> None
 
 
 def test_a_late_answer_that_contradicts_the_search_ends_its_certification() -> None:
-    one_point = load_study("critical-hamaker", ["sweep.values=[0.5]"], 0.05, certify=True)
+    one_point = certified_study("[0.5]")
     planner, physics = StudyPlanner(one_point, unknown), TwoNumerics()
     late = planner.next_task()
     assert late is not None
@@ -223,7 +233,7 @@ def test_a_late_answer_that_contradicts_the_search_ends_its_certification() -> N
 
 
 def test_certifying_comes_before_a_second_task_of_one_search() -> None:
-    two_points = load_study("critical-hamaker", ["sweep.values=[0.5, 1.0]"], 0.05, certify=True)
+    two_points = certified_study("[0.5, 1.0]")
     planner, physics = StudyPlanner(two_points, unknown), TwoNumerics()
     tasks: list[SearchRun] = []
     while not any(map(is_finer, tasks)):
@@ -242,7 +252,7 @@ def test_certifying_comes_before_a_second_task_of_one_search() -> None:
 
 
 def test_a_search_that_others_finish_meanwhile_is_certified_at_once() -> None:
-    one_point = load_study("critical-hamaker", ["sweep.values=[0.5]"], 0.05, certify=True)
+    one_point = certified_study("[0.5]")
     known: dict[str, Outcome] = {}
     planner, physics = StudyPlanner(one_point, known.get), TwoNumerics()
     out = planner.next_task()

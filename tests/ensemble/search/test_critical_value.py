@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ensemble.config.geometric_grid import GeometricGrid
 from ensemble.search.critical_value import ZONE_EDGE, CriticalValueSearch, Side, Status
-from ensemble.search.grid import GeometricGrid
 
 GRID = GeometricGrid(0.01)
 LIMITS = (0.05, 5.0)

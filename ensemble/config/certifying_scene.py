@@ -1,0 +1,43 @@
+"""The finer numerics at which the bracket of a critical value is certified."""
+
+from __future__ import annotations
+
+from ensemble.config.validation import validated
+from solver.scene import Numerics, Scene
+
+POINTS_FACTOR = 2
+TOLERANCE_FACTOR = 10
+
+
+def certifying_scene(scene: Scene) -> Scene:
+    """Return the scene at the numerics that certify it.
+
+    These have `POINTS_FACTOR` times as many points on a vesicle and a tolerance in time `TOLERANCE_FACTOR`
+    times smaller.  Where the tolerance chooses the points, the smaller one does: the numerics must follow
+    from the scene alone, and not from how many points a run has ended with.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene at the numerics of the search.
+
+    Returns
+    -------
+    Scene
+        The same but for its numerics.
+
+    Raises
+    ------
+    ValueError
+        If that is finer than numerics can be; names the field and the allowed range.
+    """
+    numerics = scene.numerics
+    points = numerics.points
+    document = numerics.model_dump() | {
+        "points": points if points == "auto" else points * POINTS_FACTOR,
+        "tolerance": numerics.tolerance / TOLERANCE_FACTOR,
+    }
+    try:
+        return scene.model_copy(update={"numerics": validated(Numerics, document)})
+    except ValueError as error:
+        raise ValueError(f"to certify, numerics.{error}") from error

@@ -1,0 +1,116 @@
+"""Checking of documents against their models, and one-line messages about those that are refused."""
+
+from __future__ import annotations
+
+import reprlib
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeVar, overload
+
+from pydantic import BaseModel, TypeAdapter, ValidationError
+from pydantic_core import ErrorDetails
+
+from ensemble.config.dotted_paths import Location, dotted, value_at
+
+Validated = TypeVar("Validated")
+SomeModel = TypeVar("SomeModel", bound=BaseModel)
+
+
+@overload
+def validated(model: type[SomeModel], document: Mapping[str, Any]) -> SomeModel: ...
+@overload
+def validated(model: TypeAdapter[Validated], document: Mapping[str, Any]) -> Validated: ...
+def validated(model: type[BaseModel] | TypeAdapter[Any], document: Mapping[str, Any]) -> Any:
+    """Return what a document describes.
+
+    Parameters
+    ----------
+    model : type or TypeAdapter
+        The model that the document has to fit.
+    document : mapping
+        Nested tables and arrays, as read from TOML.
+
+    Returns
+    -------
+    object
+        An instance of the model.
+
+    Raises
+    ------
+    ValueError
+        If the document does not fit the model; names the fields.
+    """
+    try:
+        if isinstance(model, TypeAdapter):
+            return model.validate_python(document)
+        return model.model_validate(document)
+    except ValidationError as error:
+        raise ValueError(explain(error, document)) from error
+
+
+def explain(error: ValidationError, document: Mapping[str, Any]) -> str:
+    """Say on one line why a document is refused: fields, offending values, what is allowed.
+
+    Parameters
+    ----------
+    error : ValidationError
+        Raised by validating the document.
+    document : mapping
+        The document that was validated.
+
+    Returns
+    -------
+    str
+        For example ``vesicles.0.reduced_area: 1.2 — input should be less than or equal to 1``.  Several
+        problems are separated by semicolons.
+    """
+    return describe(error.errors(include_url=False), document)
+
+
+def describe(problems: Sequence[ErrorDetails], document: Mapping[str, Any]) -> str:
+    """Say on one line which problems pydantic has found in a document.
+
+    Parameters
+    ----------
+    problems : sequence of ErrorDetails
+        As pydantic lists them.
+    document : mapping
+        The document that was validated.
+
+    Returns
+    -------
+    str
+        As `explain` returns it.
+    """
+    # When elements of an array are refused, pydantic refuses the array too: that message adds nothing.
+    enclosing = {problem["loc"][:depth] for problem in problems for depth in range(len(problem["loc"]))}
+    # Several messages about one value are about the alternatives that it could be.
+    messages: dict[str, list[str]] = {}
+    for problem in problems:
+        if problem["loc"] not in enclosing:
+            message = problem["msg"].removeprefix("Value error, ")
+            about_subject = messages.setdefault(_subject(problem, document), [])
+            about_subject.append(message[:1].lower() + message[1:])
+    return "; ".join(subject + ", or ".join(texts) for subject, texts in messages.items())
+
+
+def _subject(problem: ErrorDetails, document: Mapping[str, Any]) -> str:
+    """What a message is about: a field, and its value."""
+    location = _without_tags(problem["loc"], document)
+    subject = f"{dotted(location)}: " if location else ""
+    # For a missing field, or a check on several, the input is the enclosing table: there is no value to show.
+    if not isinstance(problem["input"], Mapping) and problem["type"] != "missing":
+        subject += f"{reprlib.repr(problem['input'])} — "
+    return subject
+
+
+def _without_tags(location: Location, document: Mapping[str, Any]) -> Location:
+    """Drop the names of union members, which pydantic puts after values and between tables and fields."""
+    kept: list[str | int] = []
+    for part in location:
+        node = value_at(document, tuple(kept))
+        if isinstance(node, str | int | float):
+            break
+        is_tag = isinstance(node, Mapping) and part not in node and part in node.values()
+        if not is_tag:
+            kept.append(part)
+    return tuple(kept)
