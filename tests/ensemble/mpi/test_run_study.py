@@ -183,25 +183,12 @@ def test_failed_and_contradictory_runs_are_reported_not_averaged(study: Study) -
 
 def test_finished_searches_tell_the_later_ones_where_to_begin() -> None:
     rates = [0.25, 0.5, 0.75, 1.0, 1.25, 1.5]
-    whole = load_study("critical-hamaker", ["search.guesses=[]", "search.tolerance=0.01"])
+    unguided = ["search.guesses=[]", "search.tolerance=0.01"]
+    whole = load_study("critical-hamaker", unguided)
     assert list(whole.sweep.values) == rates
     together = len(run_study(StudyPlanner(whole, unknown), 1, lambda out: 0))
-    apart = sum(
-        len(
-            run_study(
-                StudyPlanner(
-                    load_study(
-                        "critical-hamaker",
-                        ["search.guesses=[]", f"sweep.values=[{rate}]", "search.tolerance=0.01"],
-                    ),
-                    unknown,
-                ),
-                1,
-                lambda out: 0,
-            )
-        )
-        for rate in rates
-    )
+    points = [load_study("critical-hamaker", [*unguided, f"sweep.values=[{rate}]"]) for rate in rates]
+    apart = sum(len(run_study(StudyPlanner(point, unknown), 1, lambda out: 0)) for point in points)
     assert together < 0.75 * apart
 
 

@@ -52,9 +52,13 @@ def unknown(_: str) -> None:
     return None
 
 
+def uncertified_study(sweep_values: str, *changes: str) -> Study:
+    sweep = (f"sweep.values={sweep_values}", "search.tolerance=0.05")
+    return load_study("critical-hamaker", (*sweep, *changes))
+
+
 def certified_study(sweep_values: str) -> Study:
-    changes = [f"sweep.values={sweep_values}", "search.tolerance=0.05", "search.certify=true"]
-    return load_study("critical-hamaker", changes)
+    return uncertified_study(sweep_values, "search.certify=true")
 
 
 @pytest.fixture(scope="module")
@@ -138,9 +142,7 @@ def test_what_is_known_is_never_run_again_and_changes_nothing(
 
 def test_asked_for_later_a_certification_adds_only_its_own_runs(study: Study) -> None:
     physics = TwoNumerics(shift=1.2)
-    plain = StudyPlanner(
-        load_study("critical-hamaker", ["sweep.values=[0.25, 0.75, 1.5]", "search.tolerance=0.05"]), unknown
-    )
+    plain = StudyPlanner(uncertified_study("[0.25, 0.75, 1.5]"), unknown)
     searched = run_study(plain, physics)
     assert not any(is_finer(task) for task in searched)
     assert {(point.certified, point.certified_by) for point in plain.boundary().points} == {(False, None)}
@@ -180,9 +182,7 @@ def test_a_point_is_its_search_until_both_ends_are_certified(study: Study) -> No
 
 def test_what_cannot_be_certified_says_so_and_keeps_its_bracket(study: Study) -> None:
     physics = TwoNumerics()
-    plain = StudyPlanner(
-        load_study("critical-hamaker", ["sweep.values=[0.25, 0.75, 1.5]", "search.tolerance=0.05"]), unknown
-    )
+    plain = StudyPlanner(uncertified_study("[0.25, 0.75, 1.5]"), unknown)
     run_study(plain, physics)
     failing = StudyPlanner(study, unknown)
     run_study(failing, lambda task: Outcome.FAILED if is_finer(task) else physics(task), 2)
