@@ -1,7 +1,7 @@
 """Closed curves of fixed length, given by tangent angle and center.
 
-A curve of length L carries the tangent angle θ at ``points`` equispaced arclength positions; its points are
-the center plus the zero-mean antiderivative of (cos θ, sin θ).  Length is exact by construction; area and
+A curve of length L has the tangent angle θ at N points that are equispaced in arclength.  Its points are the
+center plus the antiderivative of mean zero of (cos θ, sin θ).  The length is exact by construction.  Area and
 closure are conserved only as accurately as the motion is computed, so their drifts measure the error.
 Curves run counterclockwise; the normal (−sin θ, cos θ) points inward.
 """
@@ -17,19 +17,34 @@ Array = NDArray[np.float64]
 
 
 def tangents(tangent_angle: Array) -> Array:
-    """Unit tangents, shape (..., 2, points)."""
+    """Return the unit tangents.
+
+    Parameters
+    ----------
+    tangent_angle : (..., N)
+
+    Returns
+    -------
+    (..., 2, N)
+        Components x and y.
+    """
     return np.stack([np.cos(tangent_angle), np.sin(tangent_angle)], axis=-2)
 
 
 def positions(tangent_angle: Array, center: Array, length: float | Array) -> Array:
-    """Points of the curves, shape (..., 2, points).
+    """Return the points of the curves.
 
     Parameters
     ----------
-    tangent_angle : (..., points)
+    tangent_angle : (..., N)
     center : (..., 2)
     length : scalar or (...)
         Perimeter of each curve.
+
+    Returns
+    -------
+    (..., 2, N)
+        Components x and y.
     """
     matrix = integration(tangent_angle.shape[-1])
     scale = np.asarray(length)[..., None, None] / (2 * np.pi)
@@ -38,9 +53,20 @@ def positions(tangent_angle: Array, center: Array, length: float | Array) -> Arr
 
 
 def area(points: Array, tangents: Array, length: float | Array) -> Array:
-    """Enclosed area ½∮(x dy − y dx) of curves, points and tangents of shape (..., 2, points).
+    """Return the enclosed area ½∮(x dy − y dx) of curves.
 
-    It is taken about their centers, so a curve that does not quite close has the same area everywhere.
+    It is taken about their centers, so a curve that does not quite close has the same area wherever it lies.
+
+    Parameters
+    ----------
+    points, tangents : (..., 2, N)
+    length : scalar or (...)
+        Perimeter of each curve.
+
+    Returns
+    -------
+    (...)
+        Positive for a counterclockwise curve.
     """
     offsets = points - points.mean(axis=-1, keepdims=True)
     moment = offsets[..., 0, :] * tangents[..., 1, :] - offsets[..., 1, :] * tangents[..., 0, :]
@@ -48,12 +74,32 @@ def area(points: Array, tangents: Array, length: float | Array) -> Array:
 
 
 def closure(tangents: Array) -> Array:
-    """How far curves are from closing relative to their length, |mean of the tangent|, (..., 2, points)."""
+    """Return how far curves are from closing, relative to their length.
+
+    Parameters
+    ----------
+    tangents : (..., 2, N)
+
+    Returns
+    -------
+    (...)
+        |∫(cos θ, sin θ) ds|/L.
+    """
     return np.asarray(np.linalg.norm(tangents.mean(axis=-1), axis=-1))
 
 
 def inclination(points: Array) -> Array:
-    """Angle in (−π/2, π/2] of the long principal axis of curves of shape (..., 2, points) against x."""
+    """Return the angle of the long principal axis of curves against x.
+
+    Parameters
+    ----------
+    points : (..., 2, N)
+
+    Returns
+    -------
+    (...)
+        Radians, in (−π/2, π/2].
+    """
     offset = points - points.mean(axis=-1, keepdims=True)
     xx = np.mean(offset[..., 0, :] ** 2, axis=-1)
     yy = np.mean(offset[..., 1, :] ** 2, axis=-1)

@@ -22,10 +22,16 @@ Array = NDArray[np.float64]
 class Membranes:
     """What stays the same during a run: M vesicles with N points each, and perhaps their images.
 
-    With ``copies`` = 2 every vesicle has an image (`symmetry`).  The C = copies·M curves in the fluid are
-    the vesicles and then the images, in the same order.
+    With ``copies`` = 2 every vesicle has an image (`solver.membrane.symmetry`).  The C = copies·M curves in
+    the fluid are the vesicles and then the images, in the same order.
 
+    Attributes
+    ----------
+    points : int
+        N, on each vesicle.
     length, bending_modulus : (M,)
+    copies : int
+        1, or 2 with images.
     """
 
     points: int
@@ -35,7 +41,20 @@ class Membranes:
 
     @classmethod
     def of(cls, vesicles: Sequence[Vesicle], points: int, copies: int = 1) -> Self:
-        """The membranes of these vesicles, sampled at ``points`` points each."""
+        """Make the membranes of these vesicles.
+
+        Parameters
+        ----------
+        vesicles : sequence of Vesicle
+        points : int
+            On each vesicle.
+        copies : int
+            1, or 2 with images.
+
+        Returns
+        -------
+        Membranes
+        """
         return cls(
             points,
             np.array([vesicle.length for vesicle in vesicles]),
@@ -45,10 +64,27 @@ class Membranes:
 
     @classmethod
     def of_scene(cls, scene: Scene) -> Self:
-        """The membranes that have to be computed for a scene whose number of points is given."""
+        """Make the membranes that have to be computed for a scene.
+
+        Parameters
+        ----------
+        scene : Scene
+            With a number of points.
+
+        Returns
+        -------
+        Membranes
+
+        Raises
+        ------
+        ValueError
+            If `numerics.points` is "auto".
+        """
         vesicles, points = independent_vesicles(scene), scene.numerics.points
         if points == "auto":
-            raise ValueError("numerics.points is 'auto': its number must have been chosen (see `resolution`)")
+            raise ValueError(
+                "numerics.points is 'auto', expected a number (`solver.simulation.resolution` chooses it)"
+            )
         return cls.of(vesicles, points, len(scene.vesicles) // len(vesicles))
 
     @property
@@ -87,36 +123,103 @@ class Membranes:
         return self.count * (self.points + 2)
 
     def pack(self, tangent_angle: Array, center: Array) -> Array:
-        """State vector of tangent angles (M, N) and centers (M, 2)."""
+        """Return the state vector.
+
+        Parameters
+        ----------
+        tangent_angle : (M, N)
+        center : (M, 2)
+
+        Returns
+        -------
+        (state_size,)
+        """
         return np.concatenate([tangent_angle.ravel(), center.T.ravel()])
 
     def tangent_angle(self, state: Array) -> Array:
-        """Tangent angles (..., M, N) of states (..., state_size)."""
+        """Return the tangent angles in states.
+
+        Parameters
+        ----------
+        state : (..., state_size)
+
+        Returns
+        -------
+        (..., M, N)
+            A view.
+        """
         size = self.count * self.points
         return state[..., :size].reshape(*state.shape[:-1], self.count, self.points)
 
     def center(self, state: Array) -> Array:
-        """Centers (..., M, 2) of states (..., state_size)."""
+        """Return the centers in states.
+
+        Parameters
+        ----------
+        state : (..., state_size)
+
+        Returns
+        -------
+        (..., M, 2)
+            A view.
+        """
         size = self.count * self.points
         return state[..., size:].reshape(*state.shape[:-1], 2, self.count).swapaxes(-1, -2)
 
     def curve_tangent_angle(self, state: Array) -> Array:
-        """Tangent angles of all curves, (..., C, N)."""
+        """Return the tangent angles of all curves.
+
+        Parameters
+        ----------
+        state : (..., state_size)
+
+        Returns
+        -------
+        (..., C, N)
+        """
         angle = self.tangent_angle(state)
         return np.concatenate([angle, angle + np.pi], axis=-2) if self.copies == 2 else angle
 
     def curve_center(self, state: Array) -> Array:
-        """Centers of all curves, (..., C, 2)."""
+        """Return the centers of all curves.
+
+        Parameters
+        ----------
+        state : (..., state_size)
+
+        Returns
+        -------
+        (..., C, 2)
+        """
         return self.with_images(self.center(state), axis=-2)
 
     def with_images(self, vectors: Array, axis: int) -> Array:
-        """Vectors on the vesicles, and the opposite ones on the images, along the axis of the vesicles."""
+        """Append to vectors on the vesicles the opposite ones on the images.
+
+        Parameters
+        ----------
+        vectors : (..., M, ...)
+        axis : int
+            Of the vesicles.
+
+        Returns
+        -------
+        (..., C, ...)
+        """
         return np.concatenate([vectors, -vectors], axis=axis) if self.copies == 2 else vectors
 
     def fold(self, columns: Array) -> Array:
-        """Linear operators (..., M·N) that act on vesicles alone, from those on all curves (..., C·N).
+        """Make operators that act on vectors on the vesicles from those that act on all curves.
 
-        What vectors on the images do is opposite to what the same vectors on the vesicles do.
+        The images carry the opposite vectors.
+
+        Parameters
+        ----------
+        columns : (..., C·N)
+
+        Returns
+        -------
+        (..., M·N)
         """
         size = self.count * self.points
         return columns[..., :size] - columns[..., size:] if self.copies == 2 else columns
@@ -160,8 +263,15 @@ def _radii(points: Array, centers: Array) -> Array:
 class Geometry:
     """Points and tangents of all membranes in one state.
 
+    Parameters
+    ----------
+    membranes : Membranes
+    state : (state_size,)
+
     Attributes
     ----------
+    tangent_angle : (M, N)
+    centers : (2, M)
     tangents, points : (2, M, N)
     curve_tangents, curve_points : (2, C, N)
         With the images.
@@ -191,13 +301,23 @@ class Geometry:
 
     @cached_property
     def curvature(self) -> Array:
-        """θ_s, (M, N); positive for a circle."""
+        """Curvature θ_s, (M, N); positive for a circle."""
         points, wavenumber = self.membranes.points, self.membranes.wavenumber
         periodic = self.tangent_angle - 2 * np.pi * np.arange(points) / points
         return wavenumber * (1 + periodic @ differentiation(points).T)
 
     def arclength_derivative(self, values: Array, order: int = 1) -> Array:
-        """∂^order/∂s^order of values (..., M, N)."""
+        """Differentiate by arclength.
+
+        Parameters
+        ----------
+        values : (..., M, N)
+        order : int
+
+        Returns
+        -------
+        (..., M, N)
+        """
         points = self.membranes.points
         derivative: Array = values.reshape(-1, points) @ differentiation(points, order).T
         derivative = derivative.reshape(values.shape)
@@ -205,24 +325,41 @@ class Geometry:
         return derivative
 
     def by_state(self, by_points: Array) -> Array:
-        """Derivatives by the state, (2, rows, state_size), from those by the points, (2, rows, 2, M·N).
+        """Turn derivatives by the points into derivatives by the state.
 
         A tangent angle moves all points of its vesicle, x_θ = ∫(−sin θ, cos θ) ds; a center moves them alike.
+
+        Parameters
+        ----------
+        by_points : (2, rows, 2, M·N)
+
+        Returns
+        -------
+        (2, rows, state_size)
         """
         count, points = self.membranes.count, self.membranes.points
         size, rows = count * points, by_points.shape[1]
         result = np.empty((2, rows, self.membranes.state_size))
         integrated = (by_points.reshape(-1, points) @ integration(points)).reshape(2, rows, 2, size)
         scaled_x, scaled_y = (self.tangents / self.membranes.wavenumber).reshape(2, -1)
-        turned = result[:, :, :size]
-        np.multiply(integrated[:, :, 1], scaled_x, out=turned)
+        by_angle = result[:, :, :size]
+        np.multiply(integrated[:, :, 1], scaled_x, out=by_angle)
         integrated[:, :, 0] *= scaled_y
-        turned -= integrated[:, :, 0]
+        by_angle -= integrated[:, :, 0]
         result[:, :, size:] = by_points.reshape(2, rows, 2 * count, points).sum(axis=3)
         return result
 
     def column_derivative(self, values: Array) -> Array:
-        """∂/∂s of the columns of vector fields (2, M·N, columns)."""
+        """Differentiate the columns of vector fields by arclength.
+
+        Parameters
+        ----------
+        values : (2, M·N, columns)
+
+        Returns
+        -------
+        (2, M·N, columns)
+        """
         count, points = self.membranes.count, self.membranes.points
         derivative: Array = differentiation(points) @ values.reshape(2, count, points, -1)
         derivative *= self.membranes.wavenumber[:, :, None]

@@ -1,7 +1,7 @@
 """Starting shapes: ellipses of exact reduced area and length, sampled equally in arclength.
 
-SciPy is imported by the functions that need it: to import it takes longer than all else that reads a scene,
-and a process that only hands scenes on has no shape to compute.
+SciPy is imported by the functions that need it.  To import it takes longer than everything else that reads a
+scene, and a process that only hands scenes on has no shape to compute.
 """
 
 from __future__ import annotations
@@ -16,15 +16,26 @@ Array = NDArray[np.float64]
 
 
 def of_reduced_area(tangent_angle: Array, reduced_area: float) -> Array:
-    """Tangent angles (points,) of a membrane like the given one (points,) that has the reduced area.
+    """Return a membrane like the given one that has exactly this reduced area.
 
-    Its deviation from a circle is scaled.  For an ellipse that the points resolve this changes nothing but
-    round-off; where they do not resolve its tips, the area through them is not the ellipse's.
+    The deviation from a circle is scaled.  For an ellipse that the points resolve this changes only
+    round-off.  Where they do not resolve its tips, the curve through them has not the area of the ellipse.
+
+    Parameters
+    ----------
+    tangent_angle : (N,)
+    reduced_area : float
+        4π·area/length², in (0, 1].
+
+    Returns
+    -------
+    (N,)
+        Tangent angles.
     """
     from scipy.optimize import brentq
 
-    turned = 2 * np.pi * np.arange(tangent_angle.size) / tangent_angle.size
-    circle = turned + np.mean(tangent_angle - turned)
+    circle = 2 * np.pi * np.arange(tangent_angle.size) / tangent_angle.size
+    circle += np.mean(tangent_angle - circle)
     deviation = tangent_angle - circle
 
     def excess(scale: float) -> float:
@@ -38,12 +49,22 @@ def of_reduced_area(tangent_angle: Array, reduced_area: float) -> Array:
 
 
 def ellipse_tangent_angle(reduced_area: float, length: float, angle: float, points: int) -> Array:
-    """Tangent angles at ``points`` positions equispaced in arclength, (points,).
+    """Return the tangent angles of an ellipse at points equispaced in arclength.
 
     Parameters
     ----------
+    reduced_area : float
+        4π·area/length², in (0, 1].
+    length : float
+        Perimeter.
     angle : float
         Direction of the long axis against x, radians.  The first point is its tip.
+    points : int
+
+    Returns
+    -------
+    (points,)
+        Radians, increasing without jumps.
     """
     from scipy.special import ellipe, ellipeinc
 
@@ -61,5 +82,4 @@ def ellipse_tangent_angle(reduced_area: float, length: float, angle: float, poin
             break
     alpha = phi + np.pi / 2
     # The tangent (−a sin α, b cos α), its angle continued beyond ±π.
-    turned = np.arctan2(minor * np.cos(alpha), -major * np.sin(alpha))
-    return angle + np.unwrap(turned)
+    return angle + np.unwrap(np.arctan2(minor * np.cos(alpha), -major * np.sin(alpha)))

@@ -1,8 +1,8 @@
 """Trigonometric interpolation on equispaced points, as dense matrices.
 
-For the few hundred points a membrane needs, a matrix product costs less than a fast Fourier transform and
-joins directly into the Jacobian.  All matrices are real and circulant (or band-limited rectangular); they
-depend on the number of points alone and are made once.
+For the few hundred points that a membrane needs, a matrix product costs less than a fast Fourier transform,
+and the matrix enters the Jacobian directly.  All matrices are real and circulant, or rectangular for
+interpolation.  They depend on the number of points alone and are made once.
 """
 
 from __future__ import annotations
@@ -22,16 +22,25 @@ def _frozen(matrix: Array) -> Array:
 
 
 def _convolution(symbol: NDArray[np.complexfloating]) -> Array:
-    """The circulant matrix whose eigenvalue on exp(ikα) is ``symbol[k]``, in FFT order."""
+    """Return the circulant matrix whose eigenvalue on exp(ikα) is ``symbol[k]``, in FFT order."""
     from scipy.linalg import circulant  # for the reason that `solver.membrane.shapes` gives
 
     return _frozen(circulant(np.fft.ifft(symbol).real).astype(np.float64))
 
 
 def wavenumbers(points: int) -> Array:
-    """Integer wavenumbers in FFT order; the highest one (points/2) is set to zero.
+    """Return the integer wavenumbers in FFT order, the highest one (points/2) set to zero.
 
     On an even number of points that mode has no sign, so an odd derivative of it vanishes.
+
+    Parameters
+    ----------
+    points : int
+        Even.
+
+    Returns
+    -------
+    (points,)
     """
     k = np.fft.fftfreq(points, 1 / points).astype(np.float64)
     k[points // 2] = 0
@@ -40,13 +49,33 @@ def wavenumbers(points: int) -> Array:
 
 @cache
 def differentiation(points: int, order: int = 1) -> Array:
-    """Matrix of d^order/dα^order at α_j = 2πj/points, shape (points, points)."""
+    """Return the matrix of d^order/dα^order at α_j = 2πj/points.
+
+    Parameters
+    ----------
+    points, order : int
+
+    Returns
+    -------
+    (points, points)
+        Not to be written to.
+    """
     return _convolution((1j * wavenumbers(points)) ** order)
 
 
 @cache
 def integration(points: int) -> Array:
-    """Matrix of the zero-mean periodic antiderivative in α of a function's zero-mean part."""
+    """Return the matrix of the periodic antiderivative of mean zero, in α, of a function's part of mean zero.
+
+    Parameters
+    ----------
+    points : int
+
+    Returns
+    -------
+    (points, points)
+        Not to be written to.
+    """
     k = wavenumbers(points)
     symbol = np.zeros(points, dtype=complex)
     symbol[k != 0] = 1 / (1j * k[k != 0])
@@ -55,7 +84,17 @@ def integration(points: int) -> Array:
 
 @cache
 def interpolation(points: int, factor: int) -> Array:
-    """Trigonometric interpolation to ``factor`` times as many points, shape (factor·points, points)."""
+    """Return the matrix of trigonometric interpolation to ``factor`` times as many points.
+
+    Parameters
+    ----------
+    points, factor : int
+
+    Returns
+    -------
+    (factor·points, points)
+        Not to be written to.
+    """
     spectrum = np.fft.fft(np.eye(points), axis=0)
     fine = np.zeros((factor * points, points), dtype=complex)
     half = points // 2
@@ -68,13 +107,37 @@ def interpolation(points: int, factor: int) -> Array:
 
 @cache
 def interpolations(points: int, largest_factor: int) -> Array:
-    """The matrices of `interpolation` for the factors 2, 4, … up to the largest, one below the other."""
+    """Return the matrices of `interpolation` for the factors 2, 4, … up to the largest, one below the other.
+
+    Parameters
+    ----------
+    points : int
+    largest_factor : int
+        A power of two; 1 leaves an empty matrix.
+
+    Returns
+    -------
+    ((2 + 4 + … + largest_factor)·points, points)
+        Not to be written to.
+    """
     factors = [2**power for power in range(1, largest_factor.bit_length())]
     return _frozen(np.concatenate([np.empty((0, points)), *(interpolation(points, f) for f in factors)]))
 
 
 def resampled(values: Array, points: int) -> Array:
-    """Trigonometric interpolation of values (..., N) to ``points`` ≥ N points, (..., points), both even."""
+    """Interpolate periodic values trigonometrically to more points.
+
+    Parameters
+    ----------
+    values : (..., N)
+        N even.
+    points : int
+        Even, at least N.
+
+    Returns
+    -------
+    (..., points)
+    """
     given = values.shape[-1]
     if points == given:
         return values
@@ -85,10 +148,19 @@ def resampled(values: Array, points: int) -> Array:
 
 @cache
 def logarithm_weights(points: int) -> Array:
-    """Circulant quadrature matrix W of the logarithm: Σ_j W_ij f_j = −½∫ log(4 sin²((α_i−β)/2)) f(β) dβ.
+    """Return the quadrature matrix W of the logarithm, Σ_j W_ij f_j = −½∫ log(4 sin²((α_i−β)/2)) f(β) dβ.
 
-    Exact for trigonometric polynomials (Kress, Linear Integral Equations, section 12.3): the operator maps
-    exp(ikα) to π/|k| exp(ikα) and constants to zero.
+    It is exact for trigonometric polynomials (Kress 2014, section 12.3): the operator maps exp(ikα) to
+    π/|k| exp(ikα) and constants to zero.
+
+    Parameters
+    ----------
+    points : int
+
+    Returns
+    -------
+    (points, points)
+        Circulant; not to be written to.
     """
     k = np.abs(np.fft.fftfreq(points, 1 / points))
     symbol = np.zeros(points, dtype=complex)
@@ -98,7 +170,17 @@ def logarithm_weights(points: int) -> Array:
 
 @cache
 def highest_modes(points: int) -> Array:
-    """Orthonormal basis of the modes with wavenumbers points/2 − 1 and points/2, shape (points, 3)."""
+    """Return an orthonormal basis of the modes with wavenumbers points/2 − 1 and points/2.
+
+    Parameters
+    ----------
+    points : int
+
+    Returns
+    -------
+    (points, 3)
+        Not to be written to.
+    """
     alpha = 2 * np.pi * np.arange(points) / points
     below = points // 2 - 1
     basis = np.stack([np.cos(below * alpha), np.sin(below * alpha), np.cos((below + 1) * alpha)], axis=1)
@@ -106,7 +188,16 @@ def highest_modes(points: int) -> Array:
 
 
 def tail(values: Array) -> Array:
-    """Root of the summed squares of the last third of the spectrum, along the last axis."""
+    """Return the amplitude of the last third of the spectrum, the root of its summed squares.
+
+    Parameters
+    ----------
+    values : (..., N)
+
+    Returns
+    -------
+    (...)
+    """
     spectrum = np.fft.rfft(values, axis=-1) / values.shape[-1]
     start = (2 * (spectrum.shape[-1] - 1)) // 3
     return 2 * np.sqrt(np.sum(np.abs(spectrum[..., start:]) ** 2, axis=-1))
