@@ -37,8 +37,7 @@ def phase_diagram(boundary: Boundary, runs: Sequence[tuple[float, float, Outcome
     swept = boundary.study["sweep"]["parameter"]
     searched = boundary.study["search"]["parameter"]
     scene = Scene.model_validate(boundary.study["scene"])
-    flow = None if scene.flow is None else scene.flow.kind
-    x, y = quantity(swept, flow), quantity(searched, flow)
+    x, y = quantity(swept, scene.flow), quantity(searched, scene.flow)
 
     figure = Figure(figsize=(WIDTH, 4.0), layout="constrained")
     axes = figure.add_subplot(xlabel=x.label, ylabel=y.label)

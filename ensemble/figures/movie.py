@@ -16,6 +16,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotSpec
+from matplotlib.quiver import Quiver
 from scipy.interpolate import Akima1DInterpolator
 
 from ensemble.disk import replacing
@@ -24,7 +25,7 @@ from ensemble.figures.panels import PANELS
 from ensemble.figures.style import GRAY, INSIDE, STYLE, TENSION_COLORS, VERMILLION
 from ensemble.figures.symbols import describe
 from solver.analysis.run import Array, Frames, Run
-from solver.flows.imposed import velocity_gradient
+from solver.flows import ImposedFlow
 
 _PACE = 8.0  # units of time a second: a doublet at shear rate 0.5 takes about five seconds a turn
 _DURATION = (5.0, 20.0)  # seconds, at least and at most
@@ -149,17 +150,22 @@ class Picture:
         self.figure.draw_without_rendering()
         self.figure.set_layout_engine("none")  # or labels would shift from picture to picture
         _fit(axes, np.abs(ends).max(axis=(0, 1, 2, 3)) + _MARGIN)
+        self._flow = None
         if run.scene.flow is not None and run.scene.flow.rate > 0:
-            _draw_flow(axes, velocity_gradient(run.scene.flow))
-        self._freeze([self._inside, self.membranes, self._time, *self._cursors])
+            self._flow = _FlowArrows(axes, run.scene.flow)
+        arrows = [self._flow.arrows] if self._flow else []
+        self._freeze([*arrows, self._inside, self.membranes, self._time, *self._cursors])
 
     def show(self, time: float) -> None:
         """Change the picture to what it shows at this time, one of the frames' or between two."""
-        ends, tension = membrane_segments(self._scene, *(values(time) for values in self._between))
+        tangent_angle, centers, tension_at_points = (values(time) for values in self._between)
+        ends, tension = membrane_segments(self._scene, tangent_angle, centers, tension_at_points)
         self.membranes.set_segments(list(ends.reshape(-1, 2, 2)))
         self.membranes.set_array(tension.ravel())
         self._inside.set_verts(list(ends[:, :, 0]))
         self._time.set_text(f"$t$ = {time:.1f}")
+        if self._flow:
+            self._flow.show(centers.T)
         for cursor in self._cursors:
             cursor.set_xdata([time, time])
 
@@ -227,26 +233,36 @@ def _fit(axes: Axes, reach: Array) -> None:
     axes.set(xlim=(-x, x), ylim=(-y, y))
 
 
-def _draw_flow(axes: Axes, gradient: Array) -> None:
-    """Draw the imposed velocity relative to the vesicles' mean, faintly, wherever the axes show."""
-    x, y = (np.array(limits) for limits in (axes.get_xlim(), axes.get_ylim()))
-    spacing = max(np.ptp(x), np.ptp(y)) / _ARROWS
-    at = np.meshgrid(*(_inner(limits, spacing) for limits in (x, y)))
-    velocity = np.tensordot(gradient, at, axes=1)
-    fastest = np.hypot(*velocity).max()
-    axes.quiver(
-        *at,
-        *velocity * (0.9 * spacing / fastest),
-        angles="xy",
-        scale_units="xy",
-        scale=1,
-        pivot="middle",
-        color=GRAY,
-        alpha=0.35,
-        width=0.004,
-        zorder=0.5,
-        label="imposed flow",
-    )
+class _FlowArrows:
+    """Faint arrows of the imposed velocity relative to that at the vesicles' mean, wherever the axes show."""
+
+    arrows: Quiver
+
+    def __init__(self, axes: Axes, flow: ImposedFlow) -> None:
+        x, y = (np.array(limits) for limits in (axes.get_xlim(), axes.get_ylim()))
+        self._flow = flow
+        self._spacing = max(np.ptp(x), np.ptp(y)) / _ARROWS
+        self._places = np.stack(np.meshgrid(*(_inner(limits, self._spacing) for limits in (x, y))))
+        self.arrows = axes.quiver(
+            *self._places,
+            *np.zeros_like(self._places),
+            angles="xy",
+            scale_units="xy",
+            scale=1,
+            pivot="middle",
+            color=GRAY,
+            alpha=0.35,
+            width=0.004,
+            zorder=0.5,
+            label="imposed flow",
+        )
+
+    def show(self, centers: Array) -> None:
+        """Show the flow while the vesicles' centers, (2, vesicles), are there."""
+        middle = centers.mean(axis=1)[:, None, None]
+        velocity = self._flow.velocity(middle + self._places, centers) - self._flow.velocity(middle, centers)
+        fastest = np.hypot(*velocity).max() or 1.0  # relative to it, a uniform flow rests
+        self.arrows.set_UVC(*(velocity * (0.9 * self._spacing / fastest)))
 
 
 def _inner(limits: Array, spacing: float) -> Array:

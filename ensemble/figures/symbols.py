@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass
 
+from solver.flows import ImposedFlow
 from solver.scene import Scene
 
 
@@ -26,8 +27,6 @@ class Quantity:
         return f"{{{self.symbol}}}_c"
 
 
-SHEAR_RATE = Quantity.named("shear rate", r"\dot{\gamma}")
-EXTENSION_RATE = Quantity.named("extension rate", r"\dot{\epsilon}")
 DISTANCE = Quantity.named("separation distance", r"\delta")
 
 _BY_PATH = {
@@ -42,21 +41,24 @@ _BY_PATH = {
 
 _MOST_NUMBERS = 3  # that are listed
 
-_FLOW_WORDS = {
-    None: "quiescent fluid",
-    "shear": "shear flow",
-    "extension": "extensional flow",
-    "trap": "a fluid trap",
-}
+_OF_THE_FLOW = "flow."
 
 
-def quantity(path: str, flow: str | None) -> Quantity:
-    """The quantity at a dotted path of a scene whose flow is of kind ``flow``.
+def quantity(path: str, flow: ImposedFlow | type[ImposedFlow] | None = None) -> Quantity:
+    """Return the quantity at a dotted path of a scene.
 
     A path that has no established symbol stands for itself.
+
+    Parameters
+    ----------
+    path : str
+    flow : ImposedFlow, optional
+        The scene's flow, or its class: it names its own parameters.
     """
-    if path == "flow.rate":
-        return SHEAR_RATE if flow == "shear" else EXTENSION_RATE
+    if flow is not None and path.startswith(_OF_THE_FLOW):
+        symbol = flow.symbols.get(path.removeprefix(_OF_THE_FLOW))
+        if symbol is not None:
+            return Quantity.named(symbol.name, symbol.tex)
     upright = r"\mathrm{" + path.replace("_", r"\_") + "}"
     return _BY_PATH.get(path, Quantity(path, upright))
 
@@ -72,7 +74,8 @@ def describe(scene: Scene, without: Collection[str] = ()) -> str:
     """
     values: dict[str, list[float]] = {}
     if scene.flow is not None:
-        values["flow.rate"] = [scene.flow.rate]
+        for field in scene.flow.symbols:
+            values[_OF_THE_FLOW + field] = [getattr(scene.flow, field)]
     values["vesicles.reduced_area"] = sorted({vesicle.reduced_area for vesicle in scene.vesicles})
     contrasts = sorted({vesicle.viscosity_contrast for vesicle in scene.vesicles})
     if contrasts != [1.0]:
@@ -82,11 +85,13 @@ def describe(scene: Scene, without: Collection[str] = ()) -> str:
         values["adhesion.distance"] = [scene.adhesion.distance]
         if scene.adhesion.cutoff is not None:
             values["adhesion.cutoff"] = [scene.adhesion.cutoff]
-    flow = None if scene.flow is None else scene.flow.kind
     count = len(scene.vesicles)
-    words = [f"{count} vesicles" if count > 1 else "1 vesicle", f"in {_FLOW_WORDS[flow]}"]
+    words = [
+        f"{count} vesicles" if count > 1 else "1 vesicle",
+        f"in {scene.flow.title if scene.flow else 'quiescent fluid'}",
+    ]
     parameters = [
-        f"${quantity(path, flow).symbol}$ = {_numbers(numbers)}"
+        f"${quantity(path, scene.flow).symbol}$ = {_numbers(numbers)}"
         for path, numbers in values.items()
         if path not in without
     ]

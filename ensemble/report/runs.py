@@ -46,7 +46,7 @@ class Runs:
 
     def _warm_up(self, scene: Scene) -> None:
         """Compile and fill caches, once for all scenes of a kind, or the first run's time would hold it."""
-        flow = None if scene.flow is None else scene.flow.kind
+        flow = type(scene.flow)
         exponents = None if scene.adhesion is None else scene.adhesion.exponents
         numerics = scene.numerics
         kind = (len(scene.vesicles), flow, exponents, numerics.points, numerics.integrator)

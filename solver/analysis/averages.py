@@ -3,19 +3,30 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from solver.analysis.revolutions import RevolutionTracker
 from solver.analysis.run import Outcome, Series, Viscosity
-from solver.scene import Extension, Scene, Shear, Trap
+from solver.scene import Scene
+
+Array = NDArray[np.float64]
 
 
-def effective_aspect_ratio(period: float | None, scene: Scene) -> float | None:
-    """Aspect ratio λ ≥ 1 of the rigid ellipse with this period, p = 2π/rate·(λ + 1/λ) (paper, eq. 9)."""
-    if period is None or not isinstance(scene.flow, Shear):
-        return None
-    half_sum = period * scene.flow.rate / (4 * np.pi)
-    return float(half_sum + np.sqrt(half_sum**2 - 1)) if half_sum >= 1 else None
+def pair_inclination(center_angle: Array) -> Array:
+    """Return the inclination of a pair from the angles of its line of centers (Quaife et al. 2019, fig. 6).
+
+    Parameters
+    ----------
+    center_angle : (...)
+        Against x, radians.
+
+    Returns
+    -------
+    (...)
+        Degrees: 180 on the diverging axis y, 90 on the converging axis x.
+    """
+    return np.asarray(90 + np.degrees(np.arcsin(np.abs(np.sin(center_angle)))))
 
 
 def inclination(scene: Scene, series: Series) -> float | None:
@@ -26,8 +37,8 @@ def inclination(scene: Scene, series: Series) -> float | None:
     """
     if "inclination_angle" in series:
         return float(np.degrees(series["inclination_angle"][-1]))
-    if isinstance(scene.flow, Extension | Trap) and "center_angle" in series:
-        return 90 + float(np.degrees(np.arcsin(abs(np.sin(series["center_angle"][-1])))))
+    if scene.flow and scene.flow.strains and "center_angle" in series:
+        return float(pair_inclination(series["center_angle"][-1]))
     return None
 
 

@@ -72,8 +72,9 @@ def measures(setting: scene.Scene, dynamics: EquationOfMotion) -> dict[str, Meas
         found["gap"] = lambda motion: gap(motion.geometry)
     else:
         found["inclination_angle"] = lambda motion: float(curve.inclination(motion.geometry.points[:, 0]))
-    if isinstance(setting.flow, scene.Shear) and setting.flow.rate > 0:
-        scale = 1 / (setting.flow.rate * dynamics.membranes.copies * target_area.sum())
+    shear_rate = setting.flow.shear_rate if setting.flow else None
+    if shear_rate:
+        scale = 1 / (shear_rate * dynamics.membranes.copies * target_area.sum())
         found["viscosity_bending_tension"] = lambda motion: scale * membrane_stress(motion)
         if adhesion:
             found["viscosity_adhesion"] = lambda motion: scale * adhesion_stress(motion)

@@ -17,7 +17,7 @@ from solver.analysis.revolutions import LongAxisTracker
 from solver.analysis.run import Outcome
 from solver.membrane import curve
 from solver.motion.equation import EquationOfMotion
-from solver.scene import Criteria, Extension, Scene, Shear, Trap
+from solver.scene import Criteria, Scene
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ class Steady:
     def __init__(self, scene: Scene) -> None:
         self._criteria = scene.criteria
         self._quiescent = scene.flow is None
-        self._pair_in_strain = isinstance(scene.flow, Extension | Trap) and len(scene.vesicles) == 2
+        self._pair_in_strain = scene.flow is not None and scene.flow.strains and len(scene.vesicles) == 2
 
     def decide(self, history: History) -> Outcome | None:
         """See `Criterion`."""
@@ -134,7 +134,7 @@ def criteria_of(scene: Scene) -> tuple[Criterion, ...]:
     found: list[Criterion] = [Separated()] if pair else []
     if may_tumble(scene):
         found.append(Tumbled(scene.criteria))
-    if pair and isinstance(scene.flow, Shear):
+    if pair and scene.flow and scene.flow.rotates:
         found.append(Revolved(scene.criteria))
     else:
         found.append(Steady(scene))
@@ -142,11 +142,12 @@ def criteria_of(scene: Scene) -> tuple[Criterion, ...]:
 
 
 def may_tumble(scene: Scene) -> bool:
-    """Whether the scene is a single vesicle in shear that has a long axis."""
-    return len(scene.vesicles) == 1 and isinstance(scene.flow, Shear) and scene.vesicles[0].reduced_area < 1
+    """Whether the scene is a single vesicle with a long axis, in a flow that rotates it."""
+    rotates = scene.flow is not None and scene.flow.rotates
+    return len(scene.vesicles) == 1 and rotates and scene.vesicles[0].reduced_area < 1
 
 
 def latest_time(scene: Scene) -> float:
     """When a run ends at the latest: a pair whose fate is the question may go on beyond the horizon."""
-    open_question = len(scene.vesicles) == 2 and isinstance(scene.flow, Shear | Trap)
+    open_question = len(scene.vesicles) == 2 and scene.flow is not None and scene.flow.extends_pairs
     return scene.horizon * (scene.criteria.extensions if open_question else 1.0)

@@ -294,6 +294,11 @@ class Geometry:
         """Inward unit normals, (2, M, N)."""
         return np.stack([-self.tangents[1], self.tangents[0]])
 
+    @property
+    def curve_centers(self) -> Array:
+        """Centers of all curves, (2, C)."""
+        return self.membranes.with_images(self.centers, axis=1)
+
     @cached_property
     def radii(self) -> Array:
         """Of the circles about the centers that hold each vesicle's points, (M,)."""

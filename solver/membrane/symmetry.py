@@ -1,7 +1,8 @@
 """A pair that a half turn about the origin leaves as it is needs only half the work.
 
-Every flow here and all forces keep such a symmetry, so the second vesicle stays the image of the first: its
-points are −x, its tangents −t and the forces on it −f.  Only the first is computed, as it moves among all.
+All forces keep such a symmetry, and so do flows that are odd.  Then the second vesicle stays the image of the
+first: its points are −x, its tangents −t and the forces on it −f.  Only the first is computed, as it moves
+among both.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from solver.scene import Scene, Vesicle
 
 def has_images(scene: Scene) -> bool:
     """Whether the scene is a vesicle and its image."""
-    if len(scene.vesicles) != 2:
+    if len(scene.vesicles) != 2 or (scene.flow is not None and not scene.flow.odd):
         return False
     first, second = scene.vesicles
     alike = second.model_copy(update={"center": first.center, "angle": first.angle}) == first

@@ -16,7 +16,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.flows.imposed import ImposedFlow, imposed_flow
+from solver.flows import ImposedFlow
 from solver.forces.adhesion import Adhesion
 from solver.forces.bending import Bending
 from solver.forces.tension import ROUND_OFF, Inextensibility
@@ -110,7 +110,7 @@ class DenseEquation:
             membranes=membranes,
             bending=Bending(),
             adhesion=_adhesion(scene.adhesion, accuracy, membranes, parallel) if several else None,
-            flow=imposed_flow(scene.flow, membranes) if scene.flow else None,
+            flow=scene.flow,
             inextensibility=Inextensibility(accuracy, 1e-3 * accuracy if several else ROUND_OFF),
             layer=SingleLayer(membranes, accuracy, parallel),
             contrast=ViscosityContrast(contrast, membranes, accuracy) if differ else None,
@@ -128,7 +128,7 @@ class DenseEquation:
             density = bending + adhesion
         velocity = self.layer.velocity(density * self.membranes.spacing[:, None])
         if self.flow:
-            velocity += self.flow.velocity(geometry)
+            velocity += self.flow.velocity(geometry.points, geometry.curve_centers)
         if self.contrast:
             velocity = self.contrast.velocity(velocity)
         free = self.inextensibility.solve(self.contrast or self.layer, geometry, velocity)
@@ -153,18 +153,15 @@ class DenseEquation:
         """
         motion = self.motion(state)
         geometry = motion.geometry
-        adhesion = flow = None
+        adhesion = None
         if self.adhesion and motion.closeness:
             adhesion = self.adhesion.jacobian(geometry, motion.closeness)
-        if self.flow:
-            flow = self.flow.jacobian(self.point_derivatives(geometry))
-        return self.linearized(motion, adhesion, flow)
+        return self.linearized(motion, adhesion)
 
-    def linearized(self, motion: Motion, adhesion: Array | None, flow: Array | None) -> Array:
+    def linearized(self, motion: Motion, adhesion: Array | None) -> Array:
         """`jacobian` in the state of a motion, whose geometry was the last one assembled.
 
-        ``adhesion`` and ``flow``, (2, M·N, state), are the derivatives of these by the state, where there are
-        such terms.
+        ``adhesion``, (2, M·N, state), are the derivatives of its force density by the state, if there is any.
         """
         geometry = motion.geometry
         force = self.bending.jacobian(geometry)
@@ -175,8 +172,8 @@ class DenseEquation:
         force *= weights
         velocity = self.layer.columns(force)
         velocity += self.layer.jacobian(geometry, self._point_forces(motion))
-        if flow is not None:
-            velocity += flow
+        if self.flow:
+            velocity += self._flow_jacobian(self.flow, geometry)
         if self.contrast:
             velocity += self.contrast.jacobian(geometry, motion.velocity)
             velocity = self.contrast.velocity(velocity)
@@ -229,6 +226,19 @@ class DenseEquation:
             by_state[0, block, count * points + vesicle] = 1.0
             by_state[1, block, count * points + count + vesicle] = 1.0
         return by_state
+
+    def _flow_jacobian(self, flow: ImposedFlow, geometry: Geometry) -> Array:
+        """Derivatives of the imposed velocity at the points by the state, (2, M·N, state)."""
+        count, size = self.membranes.count, self.membranes.state_size
+        centers_by_state = np.zeros((2, count, size))
+        for component in range(2):
+            first = size - (2 - component) * count
+            centers_by_state[component, :, first : first + count] = np.eye(count)
+        return flow.jacobian(
+            geometry.points.reshape(2, -1),
+            self.point_derivatives(geometry),
+            self.membranes.with_images(centers_by_state, axis=1),
+        )
 
     def _rate_columns(self, motion: Motion, velocity: Array) -> Array:
         """`rate_of` for the derivatives of the velocity by the state, (2, M·N, columns)."""

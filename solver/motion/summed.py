@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.flows.imposed import ImposedFlow, imposed_flow
+from solver.flows import ImposedFlow
 from solver.forces.bending import Bending
 from solver.forces.summed_adhesion import SummedAdhesion
 from solver.forces.summed_tension import Preconditioner, SummedInextensibility
@@ -68,7 +68,7 @@ class SummedEquation:
             membranes=membranes,
             bending=Bending(),
             adhesion=_adhesion(scene.adhesion, accuracy, membranes, parallel),
-            flow=imposed_flow(scene.flow, membranes) if scene.flow else None,
+            flow=scene.flow,
             inextensibility=SummedInextensibility(accuracy),
             layer=SummedSingleLayer(membranes, accuracy, parallel),
         )
@@ -100,7 +100,7 @@ class SummedEquation:
             geometry,
             self._preconditioner,
             density,
-            self.flow.velocity(geometry) if self.flow else None,
+            self.flow.velocity(geometry.points, geometry.centers) if self.flow else None,
         )
         self._last = Motion(
             geometry, neighbors, free.velocity, free.rotation_rate, free.tension, bending, adhesion
@@ -141,8 +141,7 @@ class SummedEquation:
             )
             by_state = alone.point_derivatives(geometry)
             drawn = None if stiffness is None else _drawn(stiffness[:, own[k]], by_state)
-            carried = alone.flow.jacobian(by_state) if alone.flow else None
-            blocks[k] = alone.linearized(among_others, drawn, carried)
+            blocks[k] = alone.linearized(among_others, drawn)
 
         self._preconditioner = self._precondition(motion.geometry, shares, linearize)
         angles = np.arange(count * points).reshape(count, points)

@@ -1,10 +1,10 @@
 """What is simulated: validated, frozen models of vesicles, flow, adhesion, numerics and criteria."""
 
+from solver.flows import Extension, Flow, Shear, Trap
 from solver.model import Model, NonNegative, Positive
 from solver.scene.adhesion import Adhesion
 from solver.scene.arrangement import Arrangement
 from solver.scene.criteria import Criteria
-from solver.scene.flow import Extension, Flow, Shear, Trap
 from solver.scene.numerics import Numerics
 from solver.scene.output import Output
 from solver.scene.scene import LARGEST_DENSE, Scene

@@ -10,12 +10,12 @@ from typing import Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
+from solver.flows import Flow
 from solver.model import Model, Positive
 from solver.scene.adhesion import Adhesion
 from solver.scene.arrangement import Arrangement
 from solver.scene.criteria import Criteria
 from solver.scene.ellipses import overlapping_pair
-from solver.scene.flow import Flow
 from solver.scene.numerics import Numerics
 from solver.scene.output import Output
 from solver.scene.start import Start

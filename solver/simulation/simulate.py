@@ -19,7 +19,7 @@ from solver.forces.tension import TensionNotFoundError
 from solver.integrators import StepFailedError
 from solver.membrane.geometry import Membranes
 from solver.parallel import SERIAL, Parallel, first_rank_asks, require_agreement
-from solver.scene import Scene, Shear, Start
+from solver.scene import Scene, Start
 from solver.simulation.initial_state import initial_ellipses, rotated_state
 from solver.simulation.resolution import UnresolvedError, carried, resolution_of, with_points
 from solver.simulation.segment import Segment, SegmentWork
@@ -190,7 +190,7 @@ def _summary(
     work: Work,
 ) -> Run:
     series = recorder.series
-    period = turns.period if turns and isinstance(scene.flow, Shear) else None
+    period = turns.period if turns and scene.flow and scene.flow.rotates else None
     adhesion_energy = series.get("adhesion_energy")
     return Run(
         scene=scene,
@@ -198,7 +198,7 @@ def _summary(
         failure=failure,
         time=progress.time,
         period=period,
-        effective_aspect_ratio=averages.effective_aspect_ratio(period, scene),
+        effective_aspect_ratio=scene.flow.effective_aspect_ratio(period) if scene.flow and period else None,
         inclination_angle=averages.inclination(scene, series),
         gap=float(series["gap"][-1]) if "gap" in series else None,
         viscosity=averages.viscosity(scene, series, outcome, turns),

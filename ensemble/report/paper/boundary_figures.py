@@ -11,9 +11,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ensemble.figures.style import BLACK, GRAY, MARKS, STYLE, WIDTH
-from ensemble.figures.symbols import DISTANCE, SHEAR_RATE
+from ensemble.figures.symbols import DISTANCE, quantity
 from ensemble.report.paper.power_laws import Line
 from solver.analysis.run import Outcome
+from solver.flows import Shear
 
 _CRITICAL = r"\mathcal{H}_c"
 
@@ -46,7 +47,7 @@ def diagrams(drawn: Sequence[Diagram]) -> Figure:
 def _draw(axes: Axes, diagram: Diagram) -> None:
     axes.set(
         title=f"${DISTANCE.symbol}$ = {diagram.distance:g}",
-        xlabel=SHEAR_RATE.label,
+        xlabel=quantity("flow.rate", Shear).label,
         ylabel=r"Hamaker constant, $\mathcal{H}$",
     )
     for outcome, mark in MARKS.items():

@@ -19,9 +19,9 @@ from ensemble.report.paper.results import Results
 from ensemble.report.paper.section import Chapter, Course, Drawing, Section, SectionPlan
 from solver.scene.ellipses import semi_axes
 
-_CONTRAST: Final = quantity("vesicles.viscosity_contrast", "shear")
-_AREA: Final = quantity("vesicles.reduced_area", "shear")
-_HAMAKER: Final = quantity("adhesion.hamaker", "shear")
+_CONTRAST: Final = quantity("vesicles.viscosity_contrast")
+_AREA: Final = quantity("vesicles.reduced_area")
+_HAMAKER: Final = quantity("adhesion.hamaker")
 _QUICK_TREADING: Final[dict[str, Any]] = {"sweep.values": [0.75, 0.9], "search.tolerance": 0.1}
 _QUICK_ADHESION: Final[dict[str, Any]] = {"sweep.values": [1.0, 4.0], "search.tolerance": 0.1}
 

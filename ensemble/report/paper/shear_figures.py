@@ -10,13 +10,15 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ensemble.figures.style import BLUE, GRAY, GREEN, ORANGE, PURPLE, STYLE, VERMILLION, WIDTH
-from ensemble.figures.symbols import DISTANCE, SHEAR_RATE
+from ensemble.figures.symbols import DISTANCE, quantity
 from ensemble.report.paper.published import published
 from ensemble.report.paper.shear_doublet import Doublet
 from solver.analysis.run import Outcome, Run
+from solver.flows import Shear
 
 _COLORS = (BLUE, GREEN, ORANGE, PURPLE)
 _H = r"\mathcal{H}"
+_RATE = quantity("flow.rate", Shear)
 
 
 class Curve(NamedTuple):
@@ -68,7 +70,7 @@ def periods(curves: Sequence[Curve]) -> Figure:
     figure = Figure(figsize=(WIDTH, 3.6), layout="constrained")
     axes = figure.add_subplot(xlabel=f"Hamaker constant, ${_H}$", ylabel="period")
     for color, curve in zip(_COLORS, curves, strict=False):
-        label = f"${SHEAR_RATE.symbol}$ = {curve.rate:g}, ${DISTANCE.symbol}$ = {curve.distance:g}"
+        label = f"${_RATE.symbol}$ = {curve.rate:g}, ${DISTANCE.symbol}$ = {curve.distance:g}"
         axes.plot(*_columns(curve.exact), "-", color=color, label=label)
         axes.plot(*_columns(curve.as_published), "--", color=color, linewidth=0.9)
         axes.plot(*_columns(curve.published), "D", color=color, markerfacecolor="white", markersize=4)

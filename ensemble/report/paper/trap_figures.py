@@ -25,8 +25,8 @@ from ensemble.figures.style import (
 from ensemble.report.paper.published import published
 from ensemble.search.boundary import BoundaryPoint
 from ensemble.store.run_record import RunSummary
+from solver.analysis.averages import pair_inclination
 from solver.analysis.run import Outcome, Run
-from solver.scene import Trap
 
 _COLORS = (BLUE, GREEN, ORANGE, VERMILLION, PURPLE, SKY, BLACK)
 _TOP = 0.19  # of the phase diagram; at higher rates there are only separated pairs
@@ -40,8 +40,8 @@ def angles(turning: Sequence[Run], grid: Mapping[Place, RunSummary]) -> Figure:
     figure = Figure(figsize=(WIDTH, 3.1), layout="constrained")
     left, right = figure.subplots(1, 2)
     for color, run in zip(_COLORS, turning, strict=False):
-        assert isinstance(run.scene.flow, Trap)
-        angle = 90 + np.degrees(np.arcsin(np.abs(np.sin(run.series["center_angle"]))))
+        assert run.scene.flow is not None
+        angle = pair_inclination(run.series["center_angle"])
         left.plot(run.series["time"], angle, color=color, label=rf"$\dot\epsilon$ = {run.scene.flow.rate:g}")
     left.set(
         xlabel="time $t$",

@@ -61,12 +61,12 @@ def _evaluation(group: Intracomm, vesicles: int, repeats: int) -> Measured:
     dynamics = equation_of_motion(scene, parallel)
     state = initial_ellipses(scene)
     rate = dynamics.rate(state)
-    shear = np.zeros_like(state)
     membranes, flow = dynamics.membranes, scene.flow
     assert flow is not None
     centers = membranes.center(state)
-    shear[state.size - 2 * membranes.count : state.size - membranes.count] = flow.rate * centers[:, 1]
-    states = (state + _TIME_BETWEEN_STATES * number * shear for number in range(1, repeats + 3))
+    along_flow = flow.velocity(centers.T, centers.T).T
+    drift = membranes.pack(np.zeros_like(membranes.tangent_angle(state)), along_flow)
+    states = (state + _TIME_BETWEEN_STATES * number * drift for number in range(1, repeats + 3))
     dynamics.rate(next(states))
     parallel.reset()
     iterations = dynamics.inextensibility.iterations

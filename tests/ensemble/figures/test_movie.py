@@ -138,3 +138,15 @@ def test_a_run_without_a_finite_state_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="output: the run has no finite state"):
         save_movie(failed_run(), tmp_path / "run.gif")
     assert not list(tmp_path.iterdir())
+
+
+def test_the_arrows_are_the_flow_relative_to_the_mean_of_the_vesicles() -> None:
+    run = orbit(flow="shear")  # about (5, 1), so that the flow at the mean is not zero
+    picture = Picture(run, 80)
+    picture.show(3.0)
+    view = picture.figure.axes[0]
+    (arrows,) = (artist for artist in view.collections if artist.get_label() == "imposed flow")
+    y = np.array(arrows.get_offsets())[:, 1]
+    assert np.ptp(y) > 1
+    assert not np.any(arrows.V)
+    np.testing.assert_allclose(arrows.U / np.abs(arrows.U).max(), y / np.abs(y).max(), atol=1e-12)

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from solver.flows import imposed as flow_module
 from solver.membrane.geometry import Geometry
 from solver.motion import dense as dynamics_module
 from solver.motion.dense import DenseEquation
@@ -103,8 +102,6 @@ TERMS = [
     (dynamics_module, "TruncatedAdhesion"),
     (dynamics_module, "ViscosityContrast"),
     (contrast_module, "DoubleLayer"),
-    (flow_module, "LinearFlow"),
-    (flow_module, "TrapFlow"),
 ]
 
 
@@ -135,12 +132,10 @@ ADHESION = Adhesion(hamaker=1.0, distance=0.4)
         ({"vesicles": (VESICLE,), "adhesion": ADHESION}, set()),
         ({"vesicles": (VESICLE, OTHER)}, {"Closeness"}),
         ({"vesicles": (VESICLE, OTHER), "adhesion": ADHESION}, {"Closeness", "Adhesion"}),
-        ({"vesicles": (VESICLE,), "flow": Shear(rate=0.5)}, {"LinearFlow"}),
-        ({"vesicles": (VESICLE,), "flow": Extension(rate=0.5)}, {"LinearFlow"}),
-        ({"vesicles": (VESICLE,), "flow": Trap(rate=0.5)}, {"LinearFlow", "TrapFlow"}),
+        ({"vesicles": (VESICLE,), "flow": Trap(rate=0.5)}, set()),
         (
             {"vesicles": (VESICLE, OTHER), "adhesion": ADHESION, "flow": Shear(rate=0.5)},
-            {"Closeness", "Adhesion", "LinearFlow"},
+            {"Closeness", "Adhesion"},
         ),
         (
             {"vesicles": (VESICLE, OTHER), "adhesion": ADHESION.model_copy(update={"cutoff": 1.0})},
@@ -166,7 +161,7 @@ def test_the_terms_are_constructed_once_a_simulation(constructed: Counter[str]) 
     dynamics = DenseEquation.of(scene)
     for _ in range(3):
         dynamics.rate(initial_ellipses(scene))
-    assert constructed["Adhesion"] == constructed["LinearFlow"] == constructed["TrapFlow"] == 1
+    assert constructed["Adhesion"] == 1
 
 
 def test_vesicles_far_apart_are_not_interpolated(monkeypatch: pytest.MonkeyPatch) -> None:

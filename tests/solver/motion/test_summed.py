@@ -289,7 +289,6 @@ def test_terms_that_a_scene_lacks_are_never_constructed(monkeypatch: pytest.Monk
 
     monkeypatch.setattr(summed_module, "SummedAdhesion", refuse)
     monkeypatch.setattr(summed_module, "TruncatedAdhesion", refuse)
-    monkeypatch.setattr(summed_module, "imposed_flow", refuse)
     scene = suspension(LARGEST_DENSE + 1, adhesion=None, flow=None)
     sums = SummedEquation.of(scene, SERIAL)
     sums.rate(initial_ellipses(scene))

@@ -1,0 +1,124 @@
+"""What every imposed flow states about itself.
+
+A flow owns its facts: nothing else in the project asks which flow a scene has.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.model import Model, NonNegative
+
+Array = NDArray[np.float64]
+
+
+class Symbol(NamedTuple):
+    """How the field names a parameter: in words, in TeX without dollar signs, and in plain text."""
+
+    name: str
+    tex: str
+    text: str
+
+
+class ImposedFlow(Model, ABC):
+    """A velocity that is imposed far from the vesicles and adds to the one that they cause.
+
+    Attributes
+    ----------
+    kind : str
+        Tells the registered flows apart; a literal with itself as the default.
+    rate : float
+        Scale of the velocity gradient, 1/time.  The velocity is proportional to it.
+    title : str
+        The flow in the words of a caption: "2 vesicles in …".
+    symbols : mapping from field to Symbol
+        The parameters that captions and axes name.
+    odd : bool
+        Whether velocity(−x) = −velocity(x) while the vesicles' centers are reflected as well.  Only then may a
+        pair that a half turn leaves as it is be computed as one vesicle and its image.
+    rotates : bool
+        Whether the flow turns a pair, or a single vesicle, round and round.  Then a pair has a period and is
+        bound when it revolves; a single vesicle may tumble.
+    strains : bool
+        Whether a pair comes to rest in the flow, side by side or end to end, with an inclination to the
+        diverging axis y.
+    extends_pairs : bool
+        Whether a pair that is undecided at the horizon runs on (`Criteria.extensions`).
+    """
+
+    kind: str
+    rate: NonNegative
+
+    title: ClassVar[str]
+    symbols: ClassVar[Mapping[str, Symbol]]
+    odd: ClassVar[bool] = False
+    rotates: ClassVar[bool] = False
+    strains: ClassVar[bool] = False
+    extends_pairs: ClassVar[bool] = False
+
+    @abstractmethod
+    def velocity(self, points: Array, centers: Array) -> Array:
+        """Return the velocity at points.
+
+        Parameters
+        ----------
+        points : (2, ...)
+            Positions in units of length; x, then y.
+        centers : (2, C)
+            Centers of all vesicles.
+
+        Returns
+        -------
+        (2, ...)
+        """
+
+    @abstractmethod
+    def velocity_gradient(self, points: Array) -> Array:
+        """Return the velocity gradient at points.
+
+        Parameters
+        ----------
+        points : (2, ...)
+
+        Returns
+        -------
+        (2, 2, ...)
+            Row i holds the derivatives of the velocity's component i by x and y, 1/time.
+        """
+
+    def jacobian(self, points: Array, by_state: Array, centers_by_state: Array) -> Array:
+        """Return the derivatives of the velocity at points by the state.
+
+        Parameters
+        ----------
+        points : (2, P)
+        by_state : (2, P, S)
+            Derivatives of the points by the state.
+        centers_by_state : (2, C, S)
+            Derivatives of the vesicles' centers by the state; for flows that follow them.
+
+        Returns
+        -------
+        (2, P, S)
+        """
+        return np.einsum("ijp,jps->ips", self.velocity_gradient(points), by_state)
+
+    @property
+    def shear_rate(self) -> float | None:
+        """Shear rate du_x/dy by which a stress is divided to give a viscosity; None for other flows."""
+        return None
+
+    def effective_aspect_ratio(self, period: float) -> float | None:
+        """Return the aspect ratio of a rigid ellipse that turns with a period, None where there is none.
+
+        Parameters
+        ----------
+        period : float
+            Duration of a full turn, in units of time.
+        """
+        return None
