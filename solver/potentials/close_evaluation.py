@@ -1,19 +1,19 @@
 """The single-layer potential of one membrane at points outside it, however close to it they lie.
 
-Barnett, Wu and Veerapaneni (SIAM J. Sci. Comput. 37, B519, 2015) reduce the Stokes potential to Cauchy
-integrals, take the boundary values of these from outside, where they are smooth, and continue them to the
-target by a barycentric sum, which does not notice how close the target is.  In complex numbers, with
-r = x − y from a point y of the membrane to the target x,
+Barnett, Wu & Veerapaneni 2015 reduce the Stokes potential to Cauchy integrals, take the boundary values of
+these from outside, where they are smooth, and continue them to the target by a barycentric sum, whose error
+does not depend on how close the target is.  In complex numbers, with r = x − y from a point y of the membrane
+to the target x,
 
     r⊗r/r² = ½ I + ½ [[Re w, −Im w], [−Im w, −Re w]],    w = conj(r)/r,
 
-so two integrals are all there is to evaluate:
+so two integrals are left to evaluate:
 
-- ∫ w f ds is the Cauchy integral V[τ](x) = ∫ τ/(x − y) ds of τ = conj(r) f.  It is one where the paper has
-  three, and its density vanishes at the target: nothing large cancels.
-- ∫ log|r| f ds is what Kress's rule gives for the nearest source, plus Re ∫ V[f] dx along the line from there
-  to the target.  The paper instead takes the logarithm of the whole charge at a point inside off the density;
-  a thin or bent vesicle has no good such point.
+- ∫ w f ds is the Cauchy integral V[τ](x) = ∫ τ/(x − y) ds of τ = conj(r) f.  This is one integral instead of
+  the three of that reference, and its density vanishes at the target, so nothing large cancels.
+- ∫ log|r| f ds is what the rule of Kress (2014) gives for the nearest source, plus Re ∫ V[f] dx along the
+  line from there to the target.  The reference instead subtracts from the density the logarithm of the whole
+  charge at a point inside; a thin or curved vesicle has no good such point.
 """
 
 from __future__ import annotations
@@ -42,9 +42,18 @@ _SHORT = 1.5  # spacings: up to here 6 nodes leave 1e-14, as 16 do at 10 spacing
 
 @cache
 def logarithm_correction(points: int) -> Array:
-    """What Kress's rule adds to −log r/(4π) between the points of one membrane, (points, points).
+    """Return what the rule of Kress (2014) adds to −log r/(4π) between the points of one membrane.
 
-    On the diagonal, where there is no log r, it is to be taken with r = length/2π.
+    On the diagonal, where log r is infinite, r = length/2π takes its place.
+
+    Parameters
+    ----------
+    points : int
+
+    Returns
+    -------
+    (points, points)
+        Not to be written to.
     """
     alpha = 2 * np.pi * np.arange(points) / points
     sine = np.sin((alpha[:, None] - alpha) / 2)
@@ -57,10 +66,10 @@ def logarithm_correction(points: int) -> Array:
 
 @compiled
 def _boundary_values(points: Array, tangents: Array, derivative: Array) -> tuple[Array, Array]:
-    """Limit of V[τ] from outside, as a matrix (2, n, n) with zero diagonal and a vector (2, n).
+    """Return the limit of V[τ] from outside, as a matrix (2, n, n) with zero diagonal and a vector (2, n).
 
-    Of the density τ/t (t the tangent, as dy = t ds) its value at the point itself can be taken off, since the
-    Cauchy integral of a constant vanishes outside.  What is left is smooth; with h the spacing
+    Of the density τ/t (t the tangent, as dy = t ds) its value at the point itself can be subtracted, since
+    the Cauchy integral of a constant vanishes outside.  What is left is smooth; with h the spacing
 
         V_i = Σ_{j≠i} (hτ_j − hτ_i t_j/t_i)/(y_i − y_j) − h (τ/t)'_i = (matrix·hτ + vector·hτ − hτ'/t)_i.
 
@@ -105,22 +114,28 @@ def continuation_weights(
     work: Array,
     weights: Array,
 ) -> None:
-    """Weights (2, n) that give factor·Σ_k w_k v(x_k) of a function v from its values on the membrane.
+    """Write the weights that give factor·Σ_k w_k v(x_k) of a function v from its values on the membrane.
 
     The function is analytic outside and vanishes at infinity.  Cauchy's formula for its difference from the
     value sought has a smooth integrand; solved for that value it is v(x) = Σ v_j c_j / (Σ c_j − 2πi) with
-    c_j = h t_j/(y_j − x).
+    c_j = h t_j/(y_j − x) (Barnett, Wu & Veerapaneni 2015).
 
     Parameters
     ----------
     offsets : (2, n)
         From one point of the membrane to all.
+    tangents : (2, n)
+    spacing : float
+        Arclength between neighboring points.
     step : complex
-        From that point to the target: however short it is, the two are told from each other.
+        From that point to the target.  Given as a difference it is exact however short it is.
+    factor : complex
     rule : (2, k)
         The x_k as fractions of ``step``, and the w_k.
-    work : (2, n), overwritten
-    weights : (2, n), written
+    work : (2, n)
+        Overwritten.
+    weights : (2, n)
+        Written to: real and imaginary parts.
     """
     weights[:] = 0.0
     for k in range(rule.shape[1]):
@@ -146,10 +161,10 @@ def continuation_weights(
 def _continuations(
     targets: Array, sources: Array, tangents: Array, spacing: float
 ) -> tuple[Array, Array, Indices]:
-    """Weights (m, 2, n) of the boundary values, and where the lines to the targets begin.
+    """Return the weights of the boundary values, and where the lines to the targets begin.
 
-    Returns those of the value at each target, those of the integral along the line from its nearest source,
-    and the indices (m,) of these sources.
+    These are the weights (m, 2, n) of the value at each target, those of the integral along the line from
+    its nearest source, and the indices (m,) of these sources.
     """
     m, n = targets.shape[1], sources.shape[1]
     at, along = np.zeros((m, 2, n)), np.zeros((m, 2, n))
@@ -183,11 +198,11 @@ def close_stokeslets(
     differentiation: Array,
     components: Array,
 ) -> None:
-    """Fill the components (3, m, n) of the single-layer potential of one membrane at targets outside it.
+    """Fill the components of the single-layer potential of one membrane at targets outside it.
 
-    They act on point forces, as those of `kernels.stokeslets` do, and take their place where targets are
-    close.  At any distance they are as accurate as the membrane and the forces are resolved, and on the
-    membrane itself as well, where they give the limit from outside.
+    They act on point forces, as those of `stokeslets.stokeslets` do, and take their place where targets are
+    close.  They are as accurate as the membrane and the forces are resolved, at any distance.  On the
+    membrane itself they give the limit from outside.
 
     Parameters
     ----------
@@ -200,7 +215,8 @@ def close_stokeslets(
         `logarithm_correction`.
     differentiation : (n, n)
         `spectral.differentiation`.
-    components : (3, m, n), written
+    components : (3, m, n)
+        Written to.
     """
     m, n = targets.shape[1], sources.shape[1]
     scale = 1.0 / (4.0 * np.pi)
@@ -258,10 +274,20 @@ def close_single_layer(
     components: Array,
     first: int,
 ) -> None:
-    """Replace the rows of components (3, ·, C·n) for targets too close for `refinement.refine_single_layer`.
+    """Replace the rows of components for targets too close for `refinement.refine_single_layer`.
 
-    points, tangents : (2, C, n); spacing : (C,); ``first`` as in `refinement.refine_single_layer`; the rest
-    as in `close_stokeslets`
+    Parameters
+    ----------
+    points, tangents : (2, C, n)
+        Of all curves.
+    spacing : (C,)
+    refinement : Refinement
+    correction, differentiation : (n, n)
+        As for `close_stokeslets`.
+    components : (3, ·, C·n)
+        Changed in place.
+    first : int
+        Number of the point in the first row.
     """
     n = points.shape[2]
     for g in range(refinement.groups.shape[0]):

@@ -1,8 +1,8 @@
 """Stokeslets summed as they are computed, for flows too large to store or needed once.
 
-`kernels.stokeslets` fills matrices, which pays when they multiply many forces.  Here nothing is stored, so
-that time goes into arithmetic alone: logarithm and reciprocal of r² share one division, and the loop uses
-the widest vectors that the processor has.
+`stokeslets.stokeslets` fills matrices, which pays when they multiply many forces.  Here nothing is stored,
+and all time goes into arithmetic: logarithm and reciprocal of r² share one division, and the loop uses the
+widest vectors that the processor has.
 """
 
 from __future__ import annotations
@@ -21,9 +21,18 @@ _COINCIDENT = 1e-140
 
 @compiled
 def velocity(targets: Array, sources: Array, point_forces: Array) -> Array:
-    """Σⱼ (−log r I + r⊗r/r²) fⱼ/4π with r = xᵢ − yⱼ, (2, m), for targets xᵢ (2, m) and sources yⱼ (2, n).
+    """Return the velocity Σⱼ (−log r I + r⊗r/r²) fⱼ/4π at targets xᵢ, with r = xᵢ − yⱼ.
 
     A source at the target itself contributes nothing.
+
+    Parameters
+    ----------
+    targets : (2, m)
+    sources, point_forces : (2, n)
+
+    Returns
+    -------
+    (2, m)
     """
     widest_vectors()
     isotropic = -0.5 * LOGARITHM_UNIT / (4.0 * np.pi)

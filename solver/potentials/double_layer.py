@@ -1,17 +1,16 @@
-"""The double-layer potential of Stokes flow over all membranes (Pozrikidis 1992, section 2.3, in the plane):
+"""The double-layer potential of Stokes flow over all membranes, kept as a matrix.
 
-D u(x) = 1/π ∫ (r·n) (r·u) r/r⁴ ds,  r = x − y,  n the outward normal.
-
-It reproduces a rigid motion u with the factors 0 outside, −½ on the membrane and −1 inside.  In complex
-numbers, with t the tangent and w = conj(r)/r, integration by parts along the membrane leaves
+It is D u(x) = 1/π ∫ (r·n) (r·u) r/r⁴ ds with r = x − y and the outward normal n (Pozrikidis 1992, section
+2.3, in the plane).  It reproduces a rigid motion u with the factors 0 outside, −½ on the membrane and −1
+inside.  In complex numbers, with t the tangent and w = conj(r)/r, integration by parts along the membrane
+leaves
 
     D u = P u − i/(4π) conj ∫ w u' ds,    P u(x) = 1/(2π) ∫ (r·n)/r² u ds = 1/(2π) Im ∫ t u/r ds (u real),
 
-Laplace's double layer P of each component and the integral that the single layer consists of beside its
-logarithm (`close_evaluation`): its matrix holds w, whatever the distance.  So P alone is left to integrate.
-On its own membrane it is smooth; on another one the trapezoid rule serves targets that are a few spacings
-away, and a barycentric Cauchy sum those that are closer (Barnett, Wu and Veerapaneni, SIAM J. Sci. Comput.
-37, B519, 2015).
+that is, Laplace's double layer P of each component, and the integral that is the part of the single layer
+without its logarithm (`close_evaluation`).  The matrix of the single layer holds w at any distance, so only P
+is left to integrate.  On its own membrane P is smooth.  On another one the trapezoid rule serves targets that
+are a few spacings away, and a barycentric Cauchy sum those that are closer (Barnett, Wu & Veerapaneni 2015).
 """
 
 from __future__ import annotations
@@ -31,24 +30,39 @@ Array = NDArray[np.float64]
 
 @compiled
 def nearest(x: float, y: float, points: Array) -> int:
-    """Index of the one of the points (2, n) that is nearest to (x, y)."""
-    found, least = 0, np.inf
+    """Return the index of the point that is nearest to (x, y).
+
+    Parameters
+    ----------
+    x, y : float
+    points : (2, n)
+
+    Returns
+    -------
+    int
+    """
+    index, least = 0, np.inf
     for j in range(points.shape[1]):
         square = (x - points[0, j]) ** 2 + (y - points[1, j]) ** 2
         if square < least:
-            found, least = j, square
-    return found
+            index, least = j, square
+    return index
 
 
 @compiled
 def laplace_double_layer(points: Array, tangents: Array, spacing: Array, out: Array) -> None:
-    """Fill the trapezoid rule of P (m, C·n) from all curves to their first m points.
+    """Fill the trapezoid rule of P from all curves to their first points.
 
-    To a constant P gives the factor −½ on its own curve and 0 outside.  The value at the nearest source is
-    what makes that exact, and with it the factor of every rigid motion, however few the points: a large
-    viscosity inside would magnify its error.
+    P multiplies a constant by −½ on its own curve and by 0 outside.  The weight of the nearest source is
+    chosen so that this is exact, and with it the factor of every rigid motion, however few the points: a
+    large viscosity inside would magnify its error.
 
-    points, tangents : (2, C, n); spacing : (C,)
+    Parameters
+    ----------
+    points, tangents : (2, C, n)
+    spacing : (C,)
+    out : (m, C·n)
+        Written to, for the first m points.
     """
     count, n = points.shape[1], points.shape[2]
     for i in range(out.shape[0]):
@@ -73,10 +87,10 @@ def laplace_double_layer(points: Array, tangents: Array, spacing: Array, out: Ar
 def close_laplace_double_layer(
     targets: Array, points: Array, tangents: Array, spacing: float, differentiation: Array
 ) -> Array:
-    """P (m, n) of one membrane at targets outside it, however close to it they lie.
+    """Return P of one membrane at targets outside it, however close to it they lie.
 
-    ∫ t u/r ds has the limit Σ_{j≠i} h t_j (u_j − u_i)/(y_i − y_j) − h u'_i from outside, where that of a
-    constant vanishes; it is smooth, and is continued to the target.
+    ∫ t u/r ds has the limit Σ_{j≠i} h t_j (u_j − u_i)/(y_i − y_j) − h u'_i from outside, where the integral
+    of a constant vanishes.  The limit is smooth, and is continued to the target.
 
     Parameters
     ----------
@@ -86,6 +100,10 @@ def close_laplace_double_layer(
     spacing : float
     differentiation : (n, n)
         `spectral.differentiation`.
+
+    Returns
+    -------
+    (m, n)
     """
     m, n = targets.shape[1], points.shape[1]
     limit = np.empty((2, n, n))  # real and imaginary part
@@ -135,17 +153,19 @@ def double_layer_derivatives(
 ) -> None:
     """Fill the derivatives of D u at the first m points by all points and by the tangents' angles.
 
-    On every curve P is applied to the difference of u from its value nearest to the target: that of a
-    constant changes with no geometry, and what is left is not singular.
+    On every curve P is applied to the difference of u from its value nearest to the target.  P of a constant
+    does not depend on the geometry, and what is left is not singular.
 
     Parameters
     ----------
     points, tangents : (2, C, n)
     spacing : (C,)
     values, derivatives : (2, C, n)
-        u and u' times the spacing, both held.
-    by_points : (2, m, 2, C·n), written
-    by_angle : (2, m, C·n), written
+        The velocity u, and u' times the spacing; both are held fixed.
+    by_points : (2, m, 2, C·n)
+        Written to.
+    by_angle : (2, m, C·n)
+        Written to.
     """
     count, n = points.shape[1], points.shape[2]
     rotation = 1.0 / (2.0 * np.pi)
@@ -164,8 +184,8 @@ def double_layer_derivatives(
                 across = 2.0 * (ty * dx - tx * dy) * inverse
                 by_dx = scale * (ty - across * dx) * inverse
                 by_dy = scale * (-tx - across * dy) * inverse
-                turned = scale * (tx * dx + ty * dy) * inverse
-                # w turns with the angle of r.
+                by_rotation = scale * (tx * dx + ty * dy) * inverse
+                # w rotates with the angle of r.
                 cosine = rotation * (dx * dx - dy * dy) * inverse
                 sine = rotation * 2.0 * dx * dy * inverse
                 gx, gy = derivatives[0, curve, j], derivatives[1, curve, j]
@@ -176,7 +196,7 @@ def double_layer_derivatives(
                     whirl = whirl_x if component == 0 else whirl_y
                     by_points[component, i, 0, column] = -(by_dx * u - whirl * dy * inverse)
                     by_points[component, i, 1, column] = -(by_dy * u + whirl * dx * inverse)
-                    by_angle[component, i, column] = turned * u
+                    by_angle[component, i, column] = by_rotation * u
         for component in range(2):
             for coordinate in range(2):
                 by_points[component, i, coordinate, i] -= by_points[component, i, coordinate].sum()
@@ -210,7 +230,16 @@ class DoubleLayer:
         self.matrix = np.empty((2 * size, 2 * size))
 
     def assemble(self, geometry: Geometry, closeness: Closeness | None, single_layer: Array) -> None:
-        """Fill the matrix; ``single_layer`` (2·M·N, 2·M·N) is the matrix of `SingleLayer` here."""
+        """Fill the matrix for a geometry.
+
+        Parameters
+        ----------
+        geometry : Geometry
+        closeness : Closeness or None
+            None for a single curve.
+        single_layer : (2·M·N, 2·M·N)
+            Matrix of `SingleLayer` for the same geometry.
+        """
         membranes = geometry.membranes
         points, size = membranes.points, len(self._laplace)
         laplace_double_layer(
@@ -233,9 +262,19 @@ class DoubleLayer:
         self.matrix[size:, :size] = self.matrix[:size, size:]
 
     def jacobian(self, geometry: Geometry, velocity: Array) -> Array:
-        """Derivatives of D u by the state, (2, M·N, state_size), at fixed u (2, M, N).
+        """Return the derivatives of D u by the state at fixed u.
 
         Sources that are close to their targets are differentiated as if they were not.
+
+        Parameters
+        ----------
+        geometry : Geometry
+        velocity : (2, M, N)
+            The velocity u.
+
+        Returns
+        -------
+        (2, M·N, state_size)
         """
         membranes = geometry.membranes
         size = membranes.count * membranes.points
@@ -252,12 +291,12 @@ class DoubleLayer:
             by_angle,
         )
         by_state = geometry.by_state(membranes.fold(by_points))
-        # An image turns as its vesicle does.
+        # An image rotates as its vesicle does.
         by_state[:, :, :size] += by_angle.reshape(2, size, membranes.copies, size).sum(axis=2)
         return by_state
 
     def _replace_close(self, geometry: Geometry, closeness: Closeness) -> None:
-        """Evaluate anew what targets see of curves that are too close for the trapezoid rule."""
+        """Replace the rows of targets that are too close to a curve for the trapezoid rule."""
         membranes = geometry.membranes
         points = membranes.points
         matrix = differentiation(points)

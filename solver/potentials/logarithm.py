@@ -56,10 +56,20 @@ def _double_of(typing_context: Any, bits: Any) -> Any:
 # Not reassociated: x·m ± x keeps its rounding.
 @partial(njit, cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
 def logarithm_and_reciprocal(x: float) -> tuple[float, float]:
-    """log(x)/`LOGARITHM_UNIT` and 1/x of a positive normal double below 1e307, by one division, to 3e-16.
+    """Return log(x)/`LOGARITHM_UNIT` and 1/x, by one division, to 3e-16.
 
-    x = 2^e·m with m in [√½, √2); log m = 2 artanh(z), z = (m−1)/(m+1).  With v = 1/(x(m+1)) that is
+    x = 2^e·m with m in [√½, √2), and log m = 2 artanh(z) with z = (m−1)/(m+1).  With v = 1/(x(m+1)) that is
     z = x(m−1)v, and 1/x = v(m+1).
+
+    Parameters
+    ----------
+    x : float
+        Positive, normal, below 1e307.
+
+    Returns
+    -------
+    logarithm : float
+    reciprocal : float
     """
     bits = _bits_of(x)
     exponent = (bits - _SQRT_HALF_BITS) & _EXPONENT
@@ -79,5 +89,15 @@ def logarithm_and_reciprocal(x: float) -> tuple[float, float]:
 
 @compiled(inline="always")
 def logarithm(x: float) -> float:
-    """Natural logarithm of a positive normal double below 1e307, to 3e-16."""
+    """Return the natural logarithm, to 3e-16.
+
+    Parameters
+    ----------
+    x : float
+        Positive, normal, below 1e307.
+
+    Returns
+    -------
+    float
+    """
     return LOGARITHM_UNIT * logarithm_and_reciprocal(x)[0]

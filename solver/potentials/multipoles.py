@@ -1,11 +1,11 @@
-"""What a vesicle's point forces cause far from it, by the powers of the distance.
+"""The velocity that a vesicle's point forces cause far from it, as series in powers of the distance.
 
 In complex numbers, with z from the vesicle's center to the target and t to a source, point forces f cause
 
     4π u = Σ [−log|z − t| f + ½ f + ½ (z − t)/(z̄ − t̄) f̄].
 
-Expanded in t/z that becomes three power series in w = 1/z̄, whose coefficients are the moments Σ f tᵏ, Σ f t̄ᵏ
-and Σ t f̄ t̄ᵏ (Greengard, Kropinski & Mayo, J. Comput. Phys. 125, 1996).  Cut off after p terms they err by
+Expanded in t/z this becomes three power series in w = 1/z̄, whose coefficients are the moments Σ f tᵏ, Σ f
+t̄ᵏ and Σ t f̄ t̄ᵏ (Greengard, Kropinski & Mayo 1996).  Cut off after p terms they have the relative error
 (largest |t|/|z|)^p.
 """
 
@@ -27,9 +27,18 @@ LARGEST_ORDER = 32
 
 @compiled
 def orders_between(points: Array, centers: Array, radii: Array, accuracy: float, out: Orders) -> None:
-    """Write how many terms each vesicle needs of each other's series, (M, M).
+    """Write how many terms each vesicle needs of each other's series.
 
-    Zero where they do not serve.
+    Parameters
+    ----------
+    points : (2, M, N)
+    centers : (2, M)
+    radii : (M,)
+        Of the circles about the centers that hold each vesicle's points.
+    accuracy : float
+        Relative.
+    out : (M, M)
+        Written to, by target and source; 0 where a series of `LARGEST_ORDER` terms is not accurate enough.
     """
     needed = -np.log(accuracy)
     nearest = np.empty(radii.size)
@@ -48,22 +57,32 @@ def orders_between(points: Array, centers: Array, radii: Array, accuracy: float,
 
 @compiled
 def write_coefficients(points: Array, centers: Array, first: int, point_forces: Array, out: Array) -> None:
-    """Write the coefficients of the series of m vesicles from ``first`` on, (m, 6, p + 1).
+    """Write the coefficients of the series of some vesicles.
 
-    points : (2, M, N); point_forces : (2, m, N)
+    These are real and imaginary parts of three series: of the one whose conjugate is added, of the one that
+    is added as it is, and of the one that is added times z.  In place of the first one's coefficient of w⁰
+    stands the total force.
 
-    Real and imaginary parts, in order of the series whose conjugate counts, of that which counts as it is,
-    and of that which counts times z.  The first one's coefficient of w⁰ is the whole force instead.
+    Parameters
+    ----------
+    points : (2, M, N)
+    centers : (2, M)
+    first : int
+        Number of the first of the m vesicles.
+    point_forces : (2, m, N)
+        On these.
+    out : (m, 6, p + 1)
+        Written to, up to the power p.
     """
     n, last = points.shape[2], out.shape[2] - 1
-    tx, ty, turned_x, turned_y, power_x, power_y = np.empty((6, n))
+    tx, ty, product_x, product_y, power_x, power_y = np.empty((6, n))
     for row in range(out.shape[0]):
         force_x, force_y = point_forces[0, row], point_forces[1, row]
         for i in range(n):
             tx[i] = points[0, first + row, i] - centers[0, first + row]
             ty[i] = points[1, first + row, i] - centers[1, first + row]
-            turned_x[i] = tx[i] * force_x[i] + ty[i] * force_y[i]  # t f̄
-            turned_y[i] = ty[i] * force_x[i] - tx[i] * force_y[i]
+            product_x[i] = tx[i] * force_x[i] + ty[i] * force_y[i]  # t f̄
+            product_y[i] = ty[i] * force_x[i] - tx[i] * force_y[i]
             power_x[i] = 1.0
             power_y[i] = 0.0
         series = out[row]
@@ -71,17 +90,17 @@ def write_coefficients(points: Array, centers: Array, first: int, point_forces: 
         series[2:, 0] = 0.0
         for k in range(last):
             xx = xy = yx = yy = 0.0
-            turned_along = turned_across = 0.0
+            product_along = product_across = 0.0
             for i in range(n):
                 xx += force_x[i] * power_x[i]
                 yy += force_y[i] * power_y[i]
                 xy += force_x[i] * power_y[i]
                 yx += force_y[i] * power_x[i]
-                turned_along += turned_x[i] * power_x[i] + turned_y[i] * power_y[i]
-                turned_across += turned_y[i] * power_x[i] - turned_x[i] * power_y[i]
-                grown = power_x[i] * tx[i] - power_y[i] * ty[i]
+                product_along += product_x[i] * power_x[i] + product_y[i] * power_y[i]
+                product_across += product_y[i] * power_x[i] - product_x[i] * power_y[i]
+                next_x = power_x[i] * tx[i] - power_y[i] * ty[i]
                 power_y[i] = power_x[i] * ty[i] + power_y[i] * tx[i]
-                power_x[i] = grown
+                power_x[i] = next_x
             # Σ f tᵏ = (xx − yy) + i (xy + yx) and Σ f t̄ᵏ = (xx + yy) + i (yx − xy)
             if k == 0:
                 series[0, 0], series[1, 0] = xx - yy, xy + yx
@@ -89,7 +108,7 @@ def write_coefficients(points: Array, centers: Array, first: int, point_forces: 
                 series[0, k], series[1, k] = (xx - yy) / (2 * k), -(xy + yx) / (2 * k)
                 series[2, k] += (xx + yy) / (2 * k)
                 series[3, k] += (yx - xy) / (2 * k)
-            series[2, k + 1], series[3, k + 1] = -0.5 * turned_along, -0.5 * turned_across
+            series[2, k + 1], series[3, k + 1] = -0.5 * product_along, -0.5 * product_across
             series[4, k + 1], series[5, k + 1] = 0.5 * (xx - yy), -0.5 * (xy + yx)
 
 
@@ -111,9 +130,21 @@ def _series(real: Array, imaginary: Array, order: int, wx: Array, wy: Array, x: 
 def add_series(
     targets: Array, center_x: float, center_y: float, coefficients: Array, order: int, work: Array, out: Array
 ) -> None:
-    """Add to ``out`` (2, n) the velocity that the series of one vesicle, (6, ·), give at targets (2, n).
+    """Add the velocity that the series of one vesicle give at targets.
 
-    ``work`` (6, n) is overwritten.
+    Parameters
+    ----------
+    targets : (2, n)
+    center_x, center_y : float
+        Of the vesicle.
+    coefficients : (6, ·)
+        As of `write_coefficients`.
+    order : int
+        Number of terms.
+    work : (6, n)
+        Overwritten.
+    out : (2, n)
+        Added to.
     """
     scale = 1.0 / (4.0 * np.pi)
     zx, zy, wx, wy, x, y = work[0], work[1], work[2], work[3], work[4], work[5]
@@ -152,9 +183,23 @@ def velocity(
     first: int,
     result: Array,
 ) -> None:
-    """Add the velocity (2, m, N) of m vesicles from ``first`` on: by series, or directly where none serves.
+    """Add the velocity of some vesicles that the point forces on all of them cause.
 
-    points : (2, M, N); point_forces, coefficients : (M, 2, N) and (M, 6, ·); orders : (m, M)
+    It is summed by series, or directly where these are not accurate enough.
+
+    Parameters
+    ----------
+    points : (2, M, N)
+    point_forces : (M, 2, N)
+    centers : (2, M)
+    coefficients : (M, 6, ·)
+        As of `write_coefficients`.
+    orders : (m, M)
+        Rows of `orders_between`.
+    first : int
+        Number of the first of the m vesicles.
+    result : (2, m, N)
+        Added to.
     """
     count, n = points.shape[1], points.shape[2]
     sources, forces = np.empty((2, count * n)), np.empty((2, count * n))

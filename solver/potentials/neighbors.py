@@ -1,4 +1,4 @@
-"""Which vesicles are near each other, found in a time that grows like their number."""
+"""Pairs of vesicles that are near each other, found in a time that grows like their number."""
 
 from __future__ import annotations
 
@@ -40,11 +40,11 @@ def _near_distances(
         out[pair] = np.inf
         if rows.size == 0:
             continue
-        found = np.empty(rows.size)
-        distances(points[:, target][:, rows], points[:, source], tangents[:, source], spacing[source], found)
+        near = np.empty(rows.size)
+        distances(points[:, target][:, rows], points[:, source], tangents[:, source], spacing[source], near)
         for k in range(rows.size):
-            if found[k] <= reach[pair]:
-                out[pair, rows[k]] = found[k]
+            if near[k] <= reach[pair]:
+                out[pair, rows[k]] = near[k]
 
 
 class Neighbors:
@@ -72,11 +72,11 @@ class Neighbors:
         self._points, self._curves = membranes.points, membranes.count
         centers, radii = geometry.centers, geometry.radii
         allowed = reach * membranes.spacing
-        # Points see the curve between them at most half a spacing nearer than its points.
-        found = cKDTree(centers.T).query_pairs(
+        # Between its points a curve is at most half a spacing nearer than they are.
+        unordered = cKDTree(centers.T).query_pairs(
             2 * radii.max() + allowed.max() + membranes.spacing.max(), output_type="ndarray"
         )
-        pairs = np.concatenate([found, found[:, ::-1]]).astype(np.int64)
+        pairs = np.concatenate([unordered, unordered[:, ::-1]]).astype(np.int64)
         apart = np.linalg.norm(centers[:, pairs[:, 0]] - centers[:, pairs[:, 1]], axis=0)
         touching = apart <= radii[pairs].sum(axis=1) + allowed[pairs[:, 1]] + membranes.spacing.max()
         pairs = pairs[touching]
@@ -100,9 +100,18 @@ class Neighbors:
         self.nearest = float(self.distances.min(initial=np.inf))
 
     def refinement(self, ratio: float, limits: Array | None = None) -> Refinement:
-        """See `proximity.Proximity`.  Without limits, without the targets that need none.
+        """Return the refinement, see `proximity.Proximity`.
 
-        ``ratio`` and ``limits`` are at most the reach.
+        Parameters
+        ----------
+        ratio : float
+            At most the reach.
+        limits : (C,), optional
+            At most the reach.  Without limits, targets that need no refinement are in no group.
+
+        Returns
+        -------
+        Refinement
         """
         factor = 1
         while factor < MAXIMUM_FACTOR and factor * self.nearest < ratio:
@@ -113,7 +122,19 @@ class Neighbors:
 
 
 def smallest_gap(geometry: Geometry, refinement: int) -> float:
-    """Smallest distance between two membranes, seen at ``refinement`` times as many points."""
+    """Return the smallest distance between two membranes.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        Without images.
+    refinement : int
+        Factor by which the points of each membrane are interpolated first.
+
+    Returns
+    -------
+    float
+    """
     membranes = geometry.membranes
     reach = 2.0
     while not len((near := Neighbors(geometry, reach)).pairs):
@@ -122,7 +143,7 @@ def smallest_gap(geometry: Geometry, refinement: int) -> float:
     limit = near.smallest_distance + membranes.spacing.max()
     near = Neighbors(geometry, limit / membranes.spacing.min())
     matrix = interpolation(membranes.points, refinement).T
-    found = np.empty((len(near.pairs), refinement * membranes.points))
+    gaps = np.empty((len(near.pairs), refinement * membranes.points))
     everywhere = np.full(len(near.pairs), np.inf)
     _near_distances(
         geometry.points @ matrix,
@@ -132,6 +153,6 @@ def smallest_gap(geometry: Geometry, refinement: int) -> float:
         np.full(membranes.count, np.inf),
         near.pairs,
         everywhere,
-        found,
+        gaps,
     )
-    return float(found.min())
+    return float(gaps.min())

@@ -18,26 +18,54 @@ Array = NDArray[np.float64]
 
 
 class Proximity(Protocol):
-    """Which membranes are close to which: `Closeness`, or `neighbors.Neighbors` where there are many."""
+    """Which membranes are close to which: `Closeness`, or `neighbors.Neighbors` where there are many.
 
-    nearest: float  # distance over spacing
+    Attributes
+    ----------
+    nearest : float
+        Smallest distance of a point to another membrane, over the spacing of that one.
+    """
+
+    nearest: float
 
     def refinement(self, ratio: float, limits: Array | None = None) -> Refinement:
-        """The refinement that brings every target to ``ratio`` spacings of every source.
+        """Return the refinement that brings every target to ``ratio`` refined spacings of every source.
 
-        ``limits`` (C,) are the distances over spacing of each curve within which targets are in it; without,
-        all are that are known to need a sum of their own.
+        Parameters
+        ----------
+        ratio : float
+            Distance over refined spacing.
+        limits : (C,), optional
+            Distance over spacing of each curve, within which targets are in a group of it.  Without limits
+            all targets are that may need a sum of their own.
+
+        Returns
+        -------
+        Refinement
         """
 
 
 @cache
 def all_pairs(count: int, curves: int) -> NDArray[np.int64]:
-    """All pairs (count·curves, 2) of a vesicle and a curve, itself among them."""
+    """Return all pairs of a vesicle and a curve, itself among them.
+
+    Parameters
+    ----------
+    count, curves : int
+
+    Returns
+    -------
+    (count·curves, 2)
+    """
     return np.argwhere(np.ones((count, curves)))
 
 
 class Closeness:
     """Distances between all membranes of a geometry.
+
+    Parameters
+    ----------
+    geometry : Geometry
 
     Attributes
     ----------
@@ -58,7 +86,18 @@ class Closeness:
         self.nearest = float(self.distances.min())
 
     def refinement(self, ratio: float, limits: Array | None = None) -> Refinement:
-        """See `Proximity`.  Without limits every target is in a group of every other curve."""
+        """Return the refinement, see `Proximity`.
+
+        Parameters
+        ----------
+        ratio : float
+        limits : (C,), optional
+            Without limits every target is in a group of every other curve.
+
+        Returns
+        -------
+        Refinement
+        """
         factor = 1
         while factor < MAXIMUM_FACTOR and factor * self.nearest < ratio:
             factor *= 2
@@ -71,17 +110,36 @@ class Closeness:
 
 
 def waist_error(geometry: Geometry) -> Array:
-    """Relative error (M,) of the single layer across each vesicle's own waist.
+    """Return the relative error of the single layer across each vesicle's own waist.
 
-    There the trapezoid rule, with the logarithm of the neighborhood split off, errs as on another membrane
-    (`quadrature`), and nothing is refined.
+    There the trapezoid rule, with the logarithm of the neighborhood split off, has the error that it has on
+    another membrane (`quadrature`), and nothing is refined.
+
+    Parameters
+    ----------
+    geometry : Geometry
+
+    Returns
+    -------
+    (M,)
     """
     waist = waists(geometry.points)
     return np.asarray(2 * np.exp(-2 * np.pi * waist / geometry.membranes.spacing))
 
 
 def gap(geometry: Geometry, refinement: int = 4) -> float:
-    """Smallest distance between two different membranes, seen at ``refinement`` times as many points."""
+    """Return the smallest distance between two different membranes.
+
+    Parameters
+    ----------
+    geometry : Geometry
+    refinement : int
+        Factor by which the points of each membrane are interpolated first.
+
+    Returns
+    -------
+    float
+    """
     membranes = geometry.membranes
     if membranes.copies == 1:
         return smallest_gap(geometry, refinement)

@@ -4,8 +4,9 @@ The trapezoid rule with spacing h, applied to 1/(s² + d²)^q, misses the integr
 
     4/Γ(q−½) (z/2)^(q−½) K_(q−½)(z),    z = 2πd/h,
 
-the first alias in Poisson's sum (K: modified Bessel function).  For the Stokeslet (q = 1) this is 2 exp(−z).
-Solved for z it tells, from the measured distance alone, by which factor the source is to be interpolated.
+the first alias in Poisson's sum (Trefethen & Weideman 2014; K: modified Bessel function).  For the
+Stokeslet (q = 1) this is 2 exp(−z).  Solved for z it tells, from the measured distance alone, by which factor
+the source has to be interpolated.
 """
 
 from __future__ import annotations
@@ -24,16 +25,37 @@ def _log_error(order: float, z: float) -> float:
 
 
 def trapezoid_error(order: float, ratio: float) -> float:
-    """Relative error of the trapezoid rule for 1/(s² + d²)^order at distance/spacing ``ratio``.
+    """Return the relative error of the trapezoid rule for 1/(s² + d²)^order.
 
-    At the smallest ratios, where the formula ends, it is said to be 2: as good as no value.
+    Parameters
+    ----------
+    order : float
+    ratio : float
+        Distance over spacing.
+
+    Returns
+    -------
+    float
+        At most 2, where the formula no longer holds.
     """
     return min(2.0, float(np.exp(_log_error(order, 2 * np.pi * ratio))))
 
 
 @cache
 def required_ratio(order: float, tolerance: float) -> float:
-    """Smallest distance/spacing at which the trapezoid rule integrates 1/(s² + d²)^order to ``tolerance``."""
+    """Return the smallest distance over spacing at which the trapezoid rule is accurate enough.
+
+    Parameters
+    ----------
+    order : float
+        Of the integrand 1/(s² + d²)^order.
+    tolerance : float
+        Relative error allowed.
+
+    Returns
+    -------
+    float
+    """
     lowest = max(order - 0.5, 0.1)  # below it the alias is not small and the estimate says nothing
     z = brentq(lambda z: _log_error(order, z) - np.log(tolerance), lowest, 1e3)
     return float(z) / (2 * np.pi)

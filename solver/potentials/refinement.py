@@ -1,7 +1,8 @@
 """Refining a vesicle's points for the targets that are close to it.
 
-The trapezoid rule over one membrane is accurate at a target that is a few spacings away (`quadrature`).  For
-nearer ones the membrane is interpolated to a power of two times as many points, decided target by target.
+The trapezoid rule over one membrane is accurate at a target that is a few spacings away
+(`solver.potentials.quadrature`).  For nearer ones the membrane is interpolated to a power of two times as
+many points, decided target by target.
 """
 
 from __future__ import annotations
@@ -22,13 +23,16 @@ LARGEST_REFINED = 4  # factor up to which refining serves the single layer; meas
 
 
 class Refinement(NamedTuple):
-    """Which targets see which vesicle at which factor.
+    """By which factor each curve is refined for which targets.
 
+    Attributes
+    ----------
     groups : (k, 3)
         Target vesicle, source curve and factor of each group of targets; a target is in at most one group of
         every other curve.
-    rows, starts : (·,), (k + 1,)
+    rows : (·,)
         ``rows[starts[g]:starts[g + 1]]`` are the points of group g within their vesicle.
+    starts : (k + 1,)
     interpolations : (·, n)
         `spectral.interpolations` up to the largest factor.
     """
@@ -41,7 +45,19 @@ class Refinement(NamedTuple):
 
 @compiled
 def refinement_factors(distance_per_spacing: Array, ratio: float) -> Indices:
-    """Least powers of two, at most 32, that times the distance/spacing (n,) of each point reach ``ratio``."""
+    """Return the least powers of two by which points have to be refined, at most `MAXIMUM_FACTOR`.
+
+    Parameters
+    ----------
+    distance_per_spacing : (n,)
+        Of each target.
+    ratio : float
+        Distance over refined spacing to reach.
+
+    Returns
+    -------
+    (n,)
+    """
     factors = np.ones(distance_per_spacing.size, dtype=np.int64)
     for i in range(factors.size):
         while factors[i] < MAXIMUM_FACTOR and factors[i] * distance_per_spacing[i] < ratio:
@@ -55,12 +71,22 @@ def group_targets(
 ) -> tuple[Indices, Indices, Indices]:
     """Make the groups, rows and starts of a `Refinement`.
 
+    Parameters
+    ----------
     pairs : (k, 2)
         Target vesicle and source curve.
     distances : (k, n)
         Distance over spacing, by pair and point of the target.
+    ratio : float
+        Distance over refined spacing to reach.
     limits : (C,)
         Points at this distance from a source curve, or beyond, are left out.
+
+    Returns
+    -------
+    groups : (·, 3)
+    rows : (·,)
+    starts : (·,)
     """
     groups = [(0, 0, 0)][:0]
     rows = np.empty(distances.size, dtype=np.int64)
@@ -74,10 +100,10 @@ def group_targets(
                 factors[i] = 0
         factor = 1
         while factor <= factors.max():
-            found = np.flatnonzero(factors == factor)
-            if found.size > 0:
-                rows[used : used + found.size] = found
-                used += found.size
+            members = np.flatnonzero(factors == factor)
+            if members.size > 0:
+                rows[used : used + members.size] = members
+                used += members.size
                 groups.append((target, source, factor))
                 starts.append(used)
             factor *= 2
@@ -88,7 +114,20 @@ def group_targets(
 
 
 def within(refinement: Refinement, own: slice, size: int) -> Refinement:
-    """The part of a refinement that concerns the points ``own`` of all ``size``."""
+    """Return the part of a refinement that concerns some of the points.
+
+    Parameters
+    ----------
+    refinement : Refinement
+    own : slice
+        Of these points, counted through all vesicles.
+    size : int
+        Number of all points.
+
+    Returns
+    -------
+    Refinement
+    """
     if own == slice(0, size):
         return refinement
     sizes = np.diff(refinement.starts)
@@ -102,7 +141,21 @@ def within(refinement: Refinement, own: slice, size: int) -> Refinement:
 
 
 def sum_costs(refinement: Refinement, costs: Array, size: int) -> Array:
-    """Sum for each of ``size`` points the costs (k,) of being in each group, (size,)."""
+    """Add up, for each point, the costs of the groups that it is in.
+
+    Parameters
+    ----------
+    refinement : Refinement
+        With k groups.
+    costs : (k,)
+        Of being in each group.
+    size : int
+        Number of points.
+
+    Returns
+    -------
+    (size,)
+    """
     sizes = np.diff(refinement.starts)
     group = np.repeat(np.arange(sizes.size), sizes)
     point = refinement.groups[group, 0] * refinement.interpolations.shape[1] + refinement.rows[: group.size]
@@ -111,24 +164,59 @@ def sum_costs(refinement: Refinement, costs: Array, size: int) -> Array:
 
 @compiled
 def interpolation_to(refinement: Refinement, factor: int) -> Array:
-    """The interpolation matrix (factor·n, n) for a factor of at least 2."""
+    """Return the interpolation matrix for a factor.
+
+    Parameters
+    ----------
+    refinement : Refinement
+    factor : int
+        At least 2.
+
+    Returns
+    -------
+    (factor·n, n)
+    """
     n = refinement.interpolations.shape[1]
     return refinement.interpolations[(factor - 2) * n : (2 * factor - 2) * n]
 
 
 @compiled
 def refined_points(points: Array, source: int, factor: int, refinement: Refinement) -> Array:
-    """Points (2, factor·n) of one of the curves ``points`` (2, C, n)."""
+    """Return the points of one curve, refined.
+
+    Parameters
+    ----------
+    points : (2, C, n)
+        Of all curves.
+    source : int
+        Number of the curve.
+    factor : int
+    refinement : Refinement
+
+    Returns
+    -------
+    (2, factor·n)
+    """
     coarse = np.ascontiguousarray(points[:, source])
     return coarse if factor == 1 else np.dot(coarse, interpolation_to(refinement, factor).T)
 
 
 @compiled
 def refine_single_layer(points: Array, refinement: Refinement, components: Array, first: int) -> None:
-    """Replace the rows of components (3, ·, C·n) for targets that need a factor of 2 or 4.
+    """Replace the rows of components for targets that need a factor up to `LARGEST_REFINED`.
 
-    The rows begin with the point ``first``.  Refined columns are folded back.  For closer targets
-    `close_evaluation` costs less.
+    Refined columns are folded back to the curve's own points.  For closer targets `close_evaluation` costs
+    less.
+
+    Parameters
+    ----------
+    points : (2, C, n)
+        Of all curves.
+    refinement : Refinement
+    components : (3, ·, C·n)
+        As of `stokeslets`, changed in place.
+    first : int
+        Number of the point in the first row.
     """
     n = points.shape[2]
     for g in range(refinement.groups.shape[0]):

@@ -1,10 +1,9 @@
-"""The single-layer potential of Stokes flow over all membranes (paper, appendix A):
+"""The single-layer potential of Stokes flow over all membranes, kept as a matrix.
 
-S f(x) = 1/(4π) ∫ (−log r I + r⊗r/r²) f ds,  r = x − y  (viscosity 1).
-
-On its own vesicle the logarithm is split after Kress, ½ log(4 sin²) being integrated exactly; on another
-vesicle the trapezoid rule is used, on refined sources where the target is close (`refinement`), and Cauchy
-sums where it is very close (`close_evaluation`).
+It is S f(x) = 1/(4π) ∫ (−log r I + r⊗r/r²) f ds with r = x − y and viscosity 1 (Quaife et al. 2019, appendix
+"Integral Equation Formulation").  On its own vesicle the logarithm is split (Kress 2014): ½ log(4 sin²) is
+integrated exactly.  On another vesicle the trapezoid rule is used, on refined sources where the target is
+close (`refinement`), and Cauchy sums where it is very close (`close_evaluation`).
 """
 
 from __future__ import annotations
@@ -28,7 +27,19 @@ _CLOSE_COST = 24.0
 
 
 def row_costs(refinement: Refinement, size: int) -> Array:
-    """Costs (size,) of the points' rows beyond those of far targets, in Stokeslets."""
+    """Return what the row of each point costs beyond that of a far target.
+
+    Parameters
+    ----------
+    refinement : Refinement
+    size : int
+        Number of points.
+
+    Returns
+    -------
+    (size,)
+        In Stokeslets.
+    """
     factors = refinement.groups[:, 2]
     points = refinement.interpolations.shape[1]
     each = np.where(factors > LARGEST_REFINED, _CLOSE_COST, np.where(factors > 1, 2.0 * factors, 0.0))
@@ -38,8 +49,8 @@ def row_costs(refinement: Refinement, size: int) -> Array:
 class SingleLayer:
     """Discrete single-layer potential, kept as a matrix.
 
-    It acts on point forces, that is force densities times the spacing, and is then symmetric up to
-    quadrature error.  Images (`symmetry`) carry the opposite forces.
+    It acts on point forces, which are force densities times the spacing, and is symmetric up to quadrature
+    error.  Images (`solver.membrane.symmetry`) carry the opposite forces.
 
     Parameters
     ----------
@@ -67,7 +78,14 @@ class SingleLayer:
         self._diagonal = self._correction[0, 0] - np.log(membranes.length / (2 * np.pi)) / (4 * np.pi)
 
     def assemble(self, geometry: Geometry, closeness: Closeness | None) -> None:
-        """Fill the matrix for this geometry; ``closeness`` is None for a single curve."""
+        """Fill the matrix for a geometry.
+
+        Parameters
+        ----------
+        geometry : Geometry
+        closeness : Closeness or None
+            None for a single curve.
+        """
         membranes = geometry.membranes
         size, sources = membranes.count * membranes.points, membranes.curves * membranes.points
         refinement = closeness.refinement(self._ratio) if closeness else None
@@ -103,18 +121,45 @@ class SingleLayer:
         stokeslets.join_components(shares.gather(components, axis=1), self.matrix)
 
     def velocity(self, point_forces: Array) -> Array:
-        """Velocity (2, M, N) that point forces (2, M, N) cause at the membranes' points."""
+        """Return the velocity that point forces cause at the membranes' points.
+
+        Parameters
+        ----------
+        point_forces : (2, M, N)
+
+        Returns
+        -------
+        (2, M, N)
+        """
         return (self.matrix @ point_forces.ravel()).reshape(point_forces.shape)
 
     def columns(self, point_forces: Array) -> Array:
-        """Velocities (2, M·N, columns) for several point forces (2, M·N, columns) at once."""
+        """Return the velocities that several point forces cause, all at once.
+
+        Parameters
+        ----------
+        point_forces : (2, M·N, columns)
+
+        Returns
+        -------
+        (2, M·N, columns)
+        """
         _, size, columns = point_forces.shape
         return (self.matrix @ point_forces.reshape(2 * size, columns)).reshape(2, size, columns)
 
     def jacobian(self, geometry: Geometry, point_forces: Array) -> Array:
-        """Derivatives of `velocity` by the state, (2, M·N, state_size), at fixed point forces (2, M, N).
+        """Return the derivatives of `velocity` by the state at fixed point forces.
 
         Sources that are refined for close targets are differentiated as if they were not.
+
+        Parameters
+        ----------
+        geometry : Geometry
+        point_forces : (2, M, N)
+
+        Returns
+        -------
+        (2, M·N, state_size)
         """
         membranes = geometry.membranes
         size = membranes.count * membranes.points
@@ -127,10 +172,9 @@ class SingleLayer:
         )
         by_state = shares.gather(geometry.by_state(membranes.fold(by_points)), axis=1)
         forces = point_forces.reshape(2, -1)
-        # On the diagonal r⊗r/r² is t⊗t, which turns with the tangent.
+        # On the diagonal r⊗r/r² is t⊗t, which rotates with the tangent.
         tangents, normals = geometry.tangents.reshape(2, -1), geometry.normals.reshape(2, -1)
         along, across = np.sum(tangents * forces, axis=0), np.sum(normals * forces, axis=0)
-        turned = (normals * along + tangents * across) / (4 * np.pi)
         every_point = np.arange(size)
-        by_state[:, every_point, every_point] += turned
+        by_state[:, every_point, every_point] += (normals * along + tangents * across) / (4 * np.pi)
         return by_state

@@ -13,10 +13,16 @@ Array = NDArray[np.float64]
 
 @compiled
 def stokeslets(targets: Array, sources: Array, components: Array) -> None:
-    """Fill the components xx, xy, yy (3, m, n) of (−log r I + r⊗r/r²)/4π between points.
+    """Fill the components xx, xy, yy of (−log r I + r⊗r/r²)/4π between points.
 
-    ``targets`` are (2, m), ``sources`` (2, n).  Where a target is its own source the entries are meaningless
-    and the caller's to overwrite.
+    Where a target is its own source the entries are meaningless; the caller overwrites them.
+
+    Parameters
+    ----------
+    targets : (2, m)
+    sources : (2, n)
+    components : (3, m, n)
+        Written to.
     """
     widest_vectors()
     radial = 1.0 / (4.0 * np.pi)
@@ -46,12 +52,14 @@ def complete_self_parts(
     Parameters
     ----------
     correction : (n, n)
-        What Kress's rule adds off the diagonal (`close_evaluation.logarithm_correction`).
+        What the rule of Kress (2014) adds off the diagonal (`close_evaluation.logarithm_correction`).
     diagonal : (M,)
         The whole logarithmic part on the diagonal, over 4π.
     tangents : (2, M, n)
     components : (3, m, ·)
-        Of `stokeslets` at m points from ``begin`` on; the sources begin with all M·n points.
+        Of `stokeslets` at m points; the sources begin with all M·n points.  Changed in place.
+    begin : int
+        Number of the first of the m points.
     """
     scale = 1.0 / (4.0 * np.pi)
     n = tangents.shape[2]
@@ -71,9 +79,16 @@ def complete_self_parts(
 
 @compiled
 def join_components(components: Array, matrix: Array) -> None:
-    """Write the components (3, m, n) into one matrix (2m, 2m).
+    """Write components into one matrix.
 
     Columns beyond m belong to images, on which forces are opposite.
+
+    Parameters
+    ----------
+    components : (3, m, n)
+        As of `stokeslets`.
+    matrix : (2m, 2m)
+        Written to.
     """
     m = components.shape[1]
     for block, component in ((0, 0), (1, 1), (2, 1), (3, 2)):
@@ -87,12 +102,20 @@ def join_components(components: Array, matrix: Array) -> None:
 
 @compiled
 def stokeslet_derivatives(points: Array, forces: Array, by_points: Array, first: int) -> None:
-    """Fill the derivatives (2, m, 2, n) of the velocity at m of ``points`` (2, n) by all of them.
+    """Fill the derivatives of the velocity at some points by the positions of all of them.
 
-    The m points are those from ``first`` on.  The velocity is the sum of Stokeslets of strength ``forces``
-    (2, n) at the points; with r = x − y and
-    g = F·r, moving r by δ changes one of them by
-    [−F (r·δ) + r (F·δ) + g δ − 2 g r (r·δ)/r²]/(4π r²).
+    The velocity is the sum of Stokeslets at the points.  With r = x − y, the strength F and g = F·r, moving
+    r by δ changes one of them by [−F (r·δ) + r (F·δ) + g δ − 2 g r (r·δ)/r²]/(4π r²).
+
+    Parameters
+    ----------
+    points : (2, n)
+    forces : (2, n)
+        Strengths.
+    by_points : (2, m, 2, n)
+        Written to.
+    first : int
+        Number of the first of the m points.
     """
     scale = 1.0 / (4.0 * np.pi)
     for i in range(by_points.shape[1]):
@@ -116,9 +139,19 @@ def stokeslet_derivatives(points: Array, forces: Array, by_points: Array, first:
 
 @compiled
 def distances(targets: Array, sources: Array, tangents: Array, spacing: float, out: Array) -> None:
-    """Distance of every target (2, m) to the curve through ``sources`` (2, n), to order ``spacing``².
+    """Write the distance of every target to a curve, to the second order in its spacing.
 
-    The curve is replaced by its tangent segments of length ``spacing`` at the nearest point.
+    The curve is replaced by the tangent segment, of length ``spacing``, at its nearest point.
+
+    Parameters
+    ----------
+    targets : (2, m)
+    sources, tangents : (2, n)
+        Of the curve.
+    spacing : float
+        Arclength between neighboring sources.
+    out : (m,)
+        Written to.
     """
     for i in range(targets.shape[1]):
         xi, yi = targets[0, i], targets[1, i]
@@ -139,7 +172,16 @@ def distances(targets: Array, sources: Array, tangents: Array, spacing: float, o
 
 @compiled
 def waists(points: Array) -> Array:
-    """Smallest distance (M,) between points (2, M, n) of a curve that lie at least an eighth of it apart."""
+    """Return how near each curve comes to itself: between points at least an eighth of its length apart.
+
+    Parameters
+    ----------
+    points : (2, M, n)
+
+    Returns
+    -------
+    (M,)
+    """
     count, n = points.shape[1], points.shape[2]
     out = np.empty(count)
     apart = n // 8
@@ -156,9 +198,19 @@ def waists(points: Array) -> Array:
 
 @compiled
 def pair_distances(points: Array, tangents: Array, spacing: Array, count: int) -> Array:
-    """`distances` for all ordered pairs: [a, b, i] is that of point i of curve a < ``count`` to curve b.
+    """Return the `distances` for all ordered pairs of curves.
 
-    points, tangents : (2, C, N); spacing : (C,); returns (count, C, N), infinite from a curve to itself
+    Parameters
+    ----------
+    points, tangents : (2, C, N)
+    spacing : (C,)
+    count : int
+        Of the curves, the first so many are targets.
+
+    Returns
+    -------
+    (count, C, N)
+        [a, b, i] is the distance of point i of curve a to curve b; infinite from a curve to itself.
     """
     out = np.full((count, points.shape[1], points.shape[2]), np.inf)
     for target in range(count):

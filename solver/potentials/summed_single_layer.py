@@ -1,9 +1,11 @@
-"""The single-layer potential over many membranes, summed instead of stored; see `solver.potentials.single_layer`.
+"""The single-layer potential over many membranes, summed instead of stored.
 
-Points act on points by the trapezoid rule, which is right between vesicles that are far apart: directly, or
-by the series of a vesicle where these serve (`multipoles`).  What Kress's rule adds on a vesicle itself is
-the same circulant matrix for all.  For targets near another vesicle the difference between a refined or close
-evaluation and the trapezoid rule is kept as small blocks while the geometry stays.
+See `solver.potentials.single_layer` for its definition.
+
+Points act on points by the trapezoid rule, which is accurate between vesicles that are far apart: directly,
+or by series in the moments of a vesicle (`multipoles`).  The rule of Kress (2014) adds the same circulant
+matrix on every vesicle.  For targets near another vesicle the difference between a refined or close
+evaluation and the trapezoid rule is kept in small blocks as long as the geometry stays.
 """
 
 from __future__ import annotations
@@ -27,7 +29,8 @@ from solver.potentials.stokeslets import stokeslets
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-# Measured, in Stokeslets: of a series to one target and of each of its terms; and velocities to an assembly.
+# Measured, in Stokeslets: the cost of a series at one target and of each of its terms.  And how many
+# velocities are asked for after an assembly.
 _SERIES_COST = 2.8
 _TERM_COST = 0.3
 _VELOCITIES = 8
@@ -43,7 +46,7 @@ def _near_blocks(
     differentiation: Array,
     blocks: Array,
 ) -> None:
-    """Write what the trapezoid rule lacks for near targets, components (rows, 3, n) row by row."""
+    """Write what the trapezoid rule misses at near targets, components (rows, 3, n) row by row."""
     n = points.shape[2]
     for g in range(refinement.groups.shape[0]):
         target, source, factor = refinement.groups[g]
@@ -81,9 +84,9 @@ def _near_blocks(
 def _add_blocks(
     blocks: Array, targets: Indices, sources: Indices, point_forces: Array, velocity: Array
 ) -> None:
-    """Add to ``velocity`` (2, m, n) what blocks (rows, 3, n) make of forces (M, 2, n).
+    """Add to ``velocity`` (2, m, n) the products of blocks (rows, 3, n) and forces (M, 2, n).
 
-    targets : (2, rows), vesicles and points on them; sources : (rows,), vesicles
+    ``targets`` (2, rows) are vesicles and points on them, ``sources`` (rows,) vesicles.
     """
     for row in range(blocks.shape[0]):
         xx, xy, yy = blocks[row, 0], blocks[row, 1], blocks[row, 2]
@@ -99,9 +102,9 @@ def _add_blocks(
 
 @compiled
 def _add_own(tangents: Array, lengths: Array, first: int, point_forces: Array, velocity: Array) -> None:
-    """Add what the point forces (2, m, n) of m vesicles, from ``first`` on, cause at their own points.
+    """Add the velocity that point forces (2, m, n) on m vesicles from ``first`` on cause at their own points.
 
-    That is r⊗r/r² there, t⊗t, and what the logarithm of the spacing is on a vesicle of another ``lengths``.
+    That is the limit t⊗t of r⊗r/r², and a multiple of the force that depends on the vesicle's length.
     """
     scale = 1.0 / (4.0 * np.pi)
     for row in range(velocity.shape[1]):
@@ -144,7 +147,14 @@ class SummedSingleLayer:
         self._lengths = -np.log(membranes.length / (2 * np.pi)) / (4 * np.pi)
 
     def assemble(self, geometry: Geometry, neighbors: Proximity) -> None:
-        """Make the blocks and the powers for this geometry."""
+        """Prepare velocities for a geometry.
+
+        Parameters
+        ----------
+        geometry : Geometry
+            Without images.
+        neighbors : Proximity
+        """
         membranes = geometry.membranes
         count, points = membranes.count, membranes.points
         refinement = neighbors.refinement(self.ratio)
@@ -176,9 +186,18 @@ class SummedSingleLayer:
         )
 
     def velocity(self, own_forces: Array) -> Array:
-        """Velocity (2, m, N) of this rank's m vesicles, from the point forces (2, m, N) on them.
+        """Return the velocity of this rank's m vesicles.
 
         Collective.
+
+        Parameters
+        ----------
+        own_forces : (2, m, N)
+            Point forces on these vesicles.
+
+        Returns
+        -------
+        (2, m, N)
         """
         geometry, own = self._geometry, self.shares.own
         _, count, points = own_forces.shape
@@ -197,6 +216,6 @@ class SummedSingleLayer:
 
 
 def _parts(rows: Array, points: int) -> tuple[Array, Array]:
-    """Views of what ranks exchange about m vesicles: point forces (m, 2, N) and coefficients (m, 6, ·)."""
+    """Return views of what ranks exchange about m vesicles: point forces and coefficients of series."""
     forces, coefficients = rows[:, : 2 * points], rows[:, 2 * points :]
     return forces.reshape(-1, 2, points), coefficients.reshape(-1, 6, LARGEST_ORDER + 1)

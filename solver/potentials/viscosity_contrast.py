@@ -1,7 +1,7 @@
-"""Fluids inside the vesicles whose viscosity differs from that outside (Pozrikidis 1992, section 5.3).
+"""Fluids inside the vesicles whose viscosity differs from that outside.
 
-With viscosity 1 outside and λ_k inside vesicle k, the velocity v = u_∞ + S f of equal viscosities becomes,
-by the double-layer potentials of all, on vesicle j
+With viscosity 1 outside and λ_k inside vesicle k, the velocity v = u_∞ + S f of equal viscosities becomes, on
+vesicle j, by the double-layer potentials of all (Pozrikidis 1992, section 5.3),
 
     ½(1 + λ_j) u = v + Σ_k (1 − λ_k) D_k u,   K u = v.
 
@@ -26,12 +26,12 @@ Array = NDArray[np.float64]
 
 
 class ViscosityContrast:
-    """What viscosities inside the vesicles change of the motion that forces and flow cause.
+    """The change that viscosities inside the vesicles make in the velocity that forces and flow cause.
 
     Parameters
     ----------
     contrast : (M,)
-        Viscosities inside.
+        Viscosities inside, relative to that outside.
     membranes : Membranes
     accuracy : float
         As for `SingleLayer`.
@@ -50,7 +50,16 @@ class ViscosityContrast:
         self._weights = np.tile(np.repeat(self._excess, points), 2)
 
     def assemble(self, geometry: Geometry, closeness: Closeness | None, layer: SingleLayer) -> None:
-        """Factorize K and fill the matrix; ``layer`` is assembled for the same geometry."""
+        """Factorize K and fill the matrix.
+
+        Parameters
+        ----------
+        geometry : Geometry
+        closeness : Closeness or None
+            None for a single curve.
+        layer : SingleLayer
+            Assembled for the same geometry.
+        """
         self._double_layer.assemble(geometry, closeness, layer.matrix)
         system = self._double_layer.matrix * -self._weights
         system[np.diag_indices_from(system)] += self._mean
@@ -58,17 +67,48 @@ class ViscosityContrast:
         self.matrix = self._solve(layer.matrix)
 
     def velocity(self, unchanged: Array) -> Array:
-        """The velocity (2, M, N), or velocities (2, M·N, columns), for those at equal viscosities."""
+        """Return the velocity that takes the place of one at equal viscosities.
+
+        Parameters
+        ----------
+        unchanged : (2, M, N) or (2, M·N, columns)
+            At equal viscosities.
+
+        Returns
+        -------
+        (2, M, N) or (2, M·N, columns)
+        """
         return self._solve(unchanged.reshape(len(self._mean), -1)).reshape(unchanged.shape)
 
     def jacobian(self, geometry: Geometry, velocity: Array) -> Array:
-        """What a change of the state changes of Σ (1 − λ) D u, (2, M·N, state_size), at fixed u (2, M, N)."""
+        """Return the derivatives of Σ (1 − λ) D u by the state at fixed u.
+
+        Parameters
+        ----------
+        geometry : Geometry
+        velocity : (2, M, N)
+            The velocity u.
+
+        Returns
+        -------
+        (2, M·N, state_size)
+        """
         return self._double_layer.jacobian(geometry, velocity * self._excess[:, None])
 
     def stress(self, geometry: Geometry, velocity: Array) -> float:
-        """∫ (λ − 1)(u_x n_y + u_y n_x) ds over all membranes, n outward: the shear stress it adds.
+        """Return the shear stress that the contrast adds, ∫ (λ − 1)(u_x n_y + u_y n_x) ds, n outward.
 
-        Batchelor (J. Fluid Mech. 41, 545, 1970): the fluid inside takes the stress of its own viscosity.
+        The fluid inside has the stress of its own viscosity (Batchelor 1970).
+
+        Parameters
+        ----------
+        geometry : Geometry
+        velocity : (2, M, N)
+
+        Returns
+        -------
+        float
+            Over all membranes, images included.
         """
         inward = geometry.normals
         strain = np.sum(velocity[0] * inward[1] + velocity[1] * inward[0], axis=1)
@@ -81,5 +121,14 @@ class ViscosityContrast:
 
 
 def contrasts(vesicles: Sequence[Vesicle]) -> Array:
-    """Viscosity contrasts (M,) of vesicles."""
+    """Return the viscosity contrasts of vesicles.
+
+    Parameters
+    ----------
+    vesicles : sequence of Vesicle
+
+    Returns
+    -------
+    (M,)
+    """
     return np.array([vesicle.viscosity_contrast for vesicle in vesicles])
