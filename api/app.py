@@ -1,4 +1,4 @@
-"""The application: routes, and what every request passes through."""
+"""The ASGI application: all routes, and the middleware that every request passes through."""
 
 from __future__ import annotations
 
@@ -7,20 +7,25 @@ from importlib.metadata import version
 
 from fastapi import FastAPI
 from prometheus_client import CollectorRegistry
+from pydantic import BaseModel
+from pydantic.json_schema import JsonSchemaMode
 from starlette.types import Lifespan
 
 from api.http import problems
-from api.http.body import BoundedBody
-from api.http.headers import SafeHeaders
-from api.http.metrics import JobMetrics, RequestMetrics
-from api.http.openapi import complete
-from api.http.page import add_page
-from api.http.service import Service
-from api.routes import boundaries, health, jobs, metrics, presets, runs
+from api.http.middleware import BodyLimits, RequestMetrics, SecurityHeaders
+from api.http.openapi import add_models
+from api.jobs.job import NoSuchJob
+from api.jobs.submissions import Submission
+from api.routes import boundaries, jobs, operations, presets, runs
+from api.routes.operations import JobMetrics
+from api.routes.service import Service
+from api.routes.web_page import add_web_page
 from ensemble.config.run_key import DISTRIBUTION
+from ensemble.store import NotStored
+from ensemble.store.run_record import RunSummary
 
-# What any route that asks who is there, or reads what was sent, may answer with.
-REFUSALS = problems.documented(
+# Problems that every route with authentication or parameters may answer with.
+COMMON_PROBLEMS = problems.documented(
     HTTPStatus.BAD_REQUEST,
     HTTPStatus.UNAUTHORIZED,
     HTTPStatus.FORBIDDEN,
@@ -31,14 +36,34 @@ REFUSALS = problems.documented(
     HTTPStatus.TOO_MANY_REQUESTS,
 )
 
+# Routes read submissions and write problems without FastAPI's help. Runs may hold numbers that are not
+# finite, which FastAPI does not describe.
+DESCRIBED_MODELS: tuple[tuple[type[BaseModel], JsonSchemaMode], ...] = (
+    (problems.ProblemDocument, "serialization"),
+    (Submission, "validation"),
+    (RunSummary, "serialization"),
+)
+
 
 def create_app(service: Service, lifespan: Lifespan[FastAPI] | None = None) -> FastAPI:
-    """Make the application that answers for a service."""
+    """Return the application of a service.
+
+    Parameters
+    ----------
+    service : Service
+        Its parts, which must stay open as long as the application runs.
+    lifespan : callable, optional
+        Context manager that is entered when the application starts, as Starlette defines it.
+
+    Returns
+    -------
+    FastAPI
+    """
     app = FastAPI(
         title="Vesicle ensemble",
         version=version(DISTRIBUTION),
-        description="When do two adhering vesicles stay together in a flow?  Jobs, runs and boundaries.",
-        # The interactive pages load their scripts from elsewhere; the description itself is served.
+        description="When do two adhering vesicles stay together in a flow? Jobs, runs and boundaries.",
+        # The interactive documentation would load scripts from other sites. The description is served.
         docs_url=None,
         redoc_url=None,
         lifespan=lifespan,
@@ -47,14 +72,20 @@ def create_app(service: Service, lifespan: Lifespan[FastAPI] | None = None) -> F
     registry.register(JobMetrics(service.jobs))
     app.state.service = service
     app.state.registry = registry
-    problems.install(app)
-    for resource in (jobs, runs, boundaries, presets, metrics):
-        app.include_router(resource.router, responses=REFUSALS)
-    app.include_router(health.router)
-    add_page(app)
-    complete(app)
+    problems.install_handlers(app, missing=(NotStored, NoSuchJob))
+    for router in (
+        jobs.router,
+        runs.router,
+        boundaries.router,
+        presets.router,
+        operations.metrics_router,
+    ):
+        app.include_router(router, responses=COMMON_PROBLEMS)
+    app.include_router(operations.health_router)
+    add_web_page(app)
+    add_models(app, DESCRIBED_MODELS)
     settings = service.settings
-    app.add_middleware(BoundedBody, most_bytes=settings.body_bytes, seconds=settings.body_seconds)
-    app.add_middleware(SafeHeaders)
+    app.add_middleware(BodyLimits, maximum_bytes=settings.body_bytes, seconds=settings.body_seconds)
+    app.add_middleware(SecurityHeaders)
     app.add_middleware(RequestMetrics, registry=registry)
     return app

@@ -18,8 +18,10 @@ import numpy as np
 from httpx_sse import connect_sse
 from tenacity import retry, retry_if_exception_type, stop_after_delay, wait_exponential
 
-from api.http.schemas import BoundaryDocument, CriticalValueAt, Estimate, Method, Preset
+from api.jobs.cost_estimate import Estimate
 from api.jobs.job import Job
+from api.jobs.submissions import PresetDocument
+from api.results.boundary_values import BoundaryDocument, CriticalValueDocument, ReadingMethod
 from ensemble.config.study import Study
 from ensemble.errors import EnsembleError
 from ensemble.store.run_record import FRAME_DIMENSIONS, RunSummary
@@ -166,9 +168,9 @@ class Client(AbstractContextManager["Client"]):
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def presets(self) -> list[Preset]:
+    def presets(self) -> list[PresetDocument]:
         """Studies and scenes that ship with the service, and what they may cost."""
-        return [Preset.model_validate(item) for item in self._items("/presets")]
+        return [PresetDocument.model_validate(item) for item in self._items("/presets")]
 
     def estimate(self, work: str | Study | Scene, changes: Mapping[str, Any] = {}) -> Estimate:
         """What a job may cost, without submitting it.
@@ -278,8 +280,8 @@ class Client(AbstractContextManager["Client"]):
         return TracedBoundary.model_validate_json(self.get(f"/boundaries/{key}").content)
 
     def critical_value(
-        self, key: str, parameters: Mapping[str, float], method: Method = Method.INTERPOLATED
-    ) -> CriticalValueAt:
+        self, key: str, parameters: Mapping[str, float], method: ReadingMethod = ReadingMethod.INTERPOLATED
+    ) -> CriticalValueDocument:
         """Read a critical value off a boundary, with its uncertainty.
 
         Parameters
@@ -288,11 +290,11 @@ class Client(AbstractContextManager["Client"]):
             Of the boundary.
         parameters : mapping
             Value of the swept parameter by its dotted path.
-        method : Method
+        method : ReadingMethod
             Between two points, or of the nearest.
         """
         answer = self.get(f"/boundaries/{key}/at", params={**parameters, "method": str(method)})
-        return CriticalValueAt.model_validate_json(answer.content)
+        return CriticalValueDocument.model_validate_json(answer.content)
 
     def runs(self, *where: str) -> Iterator[StoredRun]:
         """Runs that meet all conditions, such as ``outcome=bound`` or ``flow.rate>=0.5``, newest first."""

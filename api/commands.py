@@ -1,6 +1,6 @@
-"""The commands that this package adds to the command line.
+"""The commands `serve`, `worker` and `token` of the command line.
 
-Every command imports what it needs when it is called, as those of `ensemble` do.
+Each imports what it needs when it is called, as the commands of `ensemble.cli` do.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from api.auth.scope import Scope
+from api.auth import TokenScope
 from ensemble.cli.main import DEFAULT_STORE, StorePath
 from ensemble.errors import BadInput
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class TokenAction(StrEnum):
-    """What can be done about tokens."""
+    """What the command `token` does."""
 
     CREATE = "create"
     LIST = "list"
@@ -32,9 +32,9 @@ def serve(
     host: Annotated[str, typer.Option(help="Address to listen at.")] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen at; 0: a free one.")] = 8000,
     store: StorePath = DEFAULT_STORE,
-    workers: Annotated[int, typer.Option(min=0, help="Workers to run jobs beside the server.")] = 1,
+    workers: Annotated[int, typer.Option(min=0, help="Worker processes to run beside the server.")] = 1,
 ) -> None:
-    """Serve jobs, runs and boundaries over HTTP, with a page to look at them."""
+    """Serve jobs, runs and boundaries over HTTP, with a web page to look at them."""
     import api.serve
 
     api.serve.serve(_settings(store), host, port, workers)
@@ -43,12 +43,13 @@ def serve(
 def worker(
     store: StorePath = DEFAULT_STORE,
     end_with_input: Annotated[
-        bool, typer.Option("--end-with-input", help="End when standard input does.")
+        bool, typer.Option("--end-with-input", help="Stop when standard input is closed.")
     ] = False,
 ) -> None:
-    """Carry out jobs, one after the other; any number of workers may share a store and its database.
+    """Carry out jobs one after the other. Several workers may share a store.
 
-    When it ends, by a signal or otherwise, so do the processes of its job, and another worker continues it.
+    When a worker ends, whatever the reason, the processes of its job end as well, and another worker
+    continues the job.
     """
     import logging
     import signal
@@ -80,13 +81,14 @@ def worker(
 def token(
     action: Annotated[TokenAction, typer.Argument(help="What to do.")],
     name: Annotated[
-        str, typer.Argument(metavar="[USER|ID]", help="The user to create one for, or the token to revoke.")
+        str,
+        typer.Argument(metavar="[USER|ID]", help="User to create a token for, or id of the token to revoke."),
     ] = "",
-    scope: Annotated[Scope, typer.Option(help="What the token allows.")] = Scope.SUBMIT,
-    days: Annotated[float, typer.Option(min=0.0, max=3650.0, help="How long it is valid.")] = 90.0,
+    scope: Annotated[TokenScope, typer.Option(help="What the token allows.")] = TokenScope.SUBMIT,
+    days: Annotated[float, typer.Option(min=0.0, max=3650.0, help="Days until it expires.")] = 90.0,
     store: StorePath = DEFAULT_STORE,
 ) -> None:
-    """Create a bearer token, which is shown this once; list what there is; or revoke one."""
+    """Create a bearer token (it is shown only this once), list all tokens, or revoke one."""
     from rich.console import Console
 
     from api.auth.tokens import Tokens, tokens_table

@@ -1,4 +1,4 @@
-"""What an operator may set, by environment variables such as ``ENSEMBLE_MAXIMUM_RANKS=8``."""
+"""Settings of the service, from environment variables such as ``ENSEMBLE_MAXIMUM_RANKS=8``."""
 
 from __future__ import annotations
 
@@ -13,50 +13,74 @@ from ensemble.cli.main import DEFAULT_STORE
 from ensemble.store.sql_database import Place, is_file, sqlite_url
 
 
-def _rate(text: str) -> str:
-    from limits import parse  # takes a while, and a worker has no rates
+def _parsable_rate(text: str) -> str:
+    from limits import parse  # slow to import, and a worker has no rates
 
     parse(text)  # raises ValueError
     return text
 
 
-Rate = Annotated[str, AfterValidator(_rate)]
-JOBS_DATABASE = "jobs.sqlite"  # in the store, unless another database is named
+Rate = Annotated[str, AfterValidator(_parsable_rate)]
+JOBS_DATABASE = "jobs.sqlite"  # in the store, unless a database server is set
 
 
 class Settings(BaseSettings):
-    """Where the service keeps things, and the limits that it holds its users to.
+    """Where the service keeps its data, and the limits for its users.
 
-    Rates are written as the library `limits` reads them: ``100/second``, ``6000 per minute``.
+    The library `limits` defines how rates are written: ``100/second``, ``6000 per minute``. The table in
+    ``api/README.md`` describes each setting.
     """
 
     model_config = SettingsConfigDict(env_prefix="ENSEMBLE_", frozen=True, extra="ignore")
 
-    store: Path = DEFAULT_STORE
-    database: str | None = None  # URL of a server, as `ensemble.store.sql_database` says
+    store: Path = Field(DEFAULT_STORE, description="Directory of the store; the option --store overrides it.")
+    database: str | None = Field(
+        None, description="URL of a PostgreSQL database for jobs, tokens and the catalogs of new stores."
+    )
 
-    maximum_ranks: int = Field(default_factory=lambda: os.cpu_count() or 1, ge=1)  # of a job
-    maximum_seconds: float = Field(24 * 3600.0, gt=0)  # that a job may run
-    maximum_jobs: int = Field(100, ge=1)  # of one user that are not finished
-    maximum_cost: float = Field(1e9, gt=0)  # of a job: points × vesicles × time to simulate
+    maximum_ranks: int = Field(
+        default_factory=lambda: os.cpu_count() or 1, ge=1, description="Largest number of ranks of a job."
+    )
+    maximum_seconds: float = Field(
+        24 * 3600.0, gt=0, description="Longest time limit of one attempt of a job, in seconds."
+    )
+    maximum_jobs: int = Field(100, ge=1, description="Unfinished jobs that one user may have.")
+    maximum_cost: float = Field(
+        1e9, gt=0, description="Largest cost of a job: points × vesicles × time to simulate."
+    )
 
-    body_bytes: int = Field(1 << 18, ge=1)  # of a request
-    body_seconds: float = Field(10.0, gt=0)  # in which the body of a request has to arrive
-    header_bytes: int = Field(1 << 15, ge=1)
-    header_seconds: float = Field(10.0, gt=0)
-    connections: int = Field(1000, ge=1)  # at once; further ones are answered 503
-    frame_values: int = Field(1_000_000, ge=1)  # numbers in one answer about frames
+    body_bytes: int = Field(1 << 18, ge=1, description="Largest body of a request, in bytes.")
+    body_seconds: float = Field(
+        10.0, gt=0, description="Time within which the body of a request must arrive, in seconds."
+    )
+    header_bytes: int = Field(1 << 15, ge=1, description="Largest request line with headers, in bytes.")
+    header_seconds: float = Field(
+        10.0, gt=0, description="Time within which request line and headers must arrive, in seconds."
+    )
+    connections: int = Field(
+        1000, ge=1, description="Simultaneous connections; further ones are answered with 503."
+    )
+    frame_values: int = Field(
+        1_000_000, ge=1, description="Largest number of values in one answer about recorded states."
+    )
 
-    request_rate: Rate = "6000/minute"  # of one user
-    refusal_rate: Rate = "20/minute"  # bad tokens from one address, after which it is refused for a while
+    request_rate: Rate = Field("6000/minute", description="Largest rate of requests of one user.")
+    refusal_rate: Rate = Field(
+        "20/minute", description="Largest rate of invalid tokens from one address; then all are refused."
+    )
 
-    event_seconds: float = Field(0.5, gt=0)  # between looks at a job that somebody listens to
+    event_seconds: float = Field(
+        0.5,
+        gt=0,
+        description="Interval between readings of a job whose events a client listens to, in seconds.",
+    )
 
     @property
     def database_url(self) -> str:
-        """URL of the database of jobs and tokens: an SQLite file in the store unless one is set.
+        """URL of the database of jobs and tokens.
 
-        A store that was made with a server for its catalog has them there, too.
+        It is the one that is set, else the database server that the store has its catalog on, else an SQLite
+        file in the store.
         """
         if self.database is not None:
             return self.database

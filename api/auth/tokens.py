@@ -1,4 +1,4 @@
-"""Bearer tokens.  Of each, the database holds a digest; the token itself is shown once, when it is made."""
+"""Bearer tokens. The database holds a digest of each; the token itself is shown once, when it is created."""
 
 from __future__ import annotations
 
@@ -13,33 +13,42 @@ from pydantic import BaseModel, ConfigDict
 from rich.table import Table
 from sqlalchemy import bindparam, delete, insert, select
 
-from api.auth.scope import Scope
+from api.auth import TokenScope
 from api.database.database_tables import TokenRow
 from api.database.service_database import Database
 from ensemble.errors import BadInput
 from ensemble.timestamp import Timestamp, now
 
-ID_BYTES = 6
-SECRET_BYTES = 32  # as many as the digest has: it needs no salt and no slow hash
-USER = re.compile(r"[A-Za-z0-9._@-]{1,64}")
-LONGEST = 200  # of what is taken for a token at all
-NOBODY = hashlib.sha256(b"").hexdigest()
+IDENTIFIER_BYTES = 6
+SECRET_BYTES = 32  # as random as the digest is long: no salt and no slow hash are needed
+USER_PATTERN = re.compile(r"[A-Za-z0-9._@-]{1,64}")
+MAXIMUM_LENGTH = 200  # characters of a token; what follows is ignored
+EMPTY_DIGEST = hashlib.sha256(b"").hexdigest()
 
 
 class Token(BaseModel):
-    """What is known of a token.  `id` is the part of it that is no secret."""
+    """A token without its secret part.
+
+    Attributes
+    ----------
+    id : str
+        The first part of the token, which is not secret.
+    user : str
+    scope : TokenScope
+    created, expires : datetime
+    """
 
     model_config = ConfigDict(frozen=True, from_attributes=True)
 
     id: str
     user: str
-    scope: Scope
+    scope: TokenScope
     created: Timestamp
     expires: Timestamp
 
 
-_SEEN = tuple(getattr(TokenRow, name) for name in Token.model_fields)
-_SHOWN = select(*_SEEN, TokenRow.digest).where(TokenRow.id == bindparam("identifier"))
+_COLUMNS = tuple(getattr(TokenRow, name) for name in Token.model_fields)
+_BY_IDENTIFIER = select(*_COLUMNS, TokenRow.digest).where(TokenRow.id == bindparam("identifier"))
 
 
 class Tokens:
@@ -49,24 +58,37 @@ class Tokens:
     ----------
     database : Database
     clock : callable
-        The present.
+        Returns the present time.
     """
 
     def __init__(self, database: Database, clock: Callable[[], datetime] = now) -> None:
         self._database = database
         self._clock = clock
 
-    def create(self, user: str, scope: Scope, lifetime: timedelta) -> str:
-        """Make a token and return it; nobody can read it again.
+    def create(self, user: str, scope: TokenScope, lifetime: timedelta) -> str:
+        """Create a token.
+
+        Parameters
+        ----------
+        user : str
+            1 to 64 letters, digits and ``. _ @ -``.
+        scope : TokenScope
+        lifetime : timedelta
+            Time after which the token expires.
+
+        Returns
+        -------
+        str
+            The token. It cannot be read again.
 
         Raises
         ------
         BadInput
-            If the name of the user is none.
+            If the name of the user is not allowed.
         """
-        if USER.fullmatch(user) is None:
+        if USER_PATTERN.fullmatch(user) is None:
             raise BadInput(f"user: {user!r} — must be 1 to 64 letters, digits and . _ @ -")
-        identifier, secret = secrets.token_hex(ID_BYTES), secrets.token_urlsafe(SECRET_BYTES)
+        identifier, secret = secrets.token_hex(IDENTIFIER_BYTES), secrets.token_urlsafe(SECRET_BYTES)
         created = self._clock()
         token = Token(id=identifier, user=user, scope=scope, created=created, expires=created + lifetime)
         with self._database.begin() as connection:
@@ -74,34 +96,50 @@ class Tokens:
         return f"{identifier}.{secret}"
 
     def find(self, text: str) -> Token | None:
-        """Return what is known of a token that somebody shows; None if it is not valid."""
-        identifier, _, secret = text[:LONGEST].partition(".")
+        """Return the token that a client sent.
+
+        Parameters
+        ----------
+        text : str
+            The whole token.
+
+        Returns
+        -------
+        Token or None
+            None if the token is unknown or expired.
+        """
+        identifier, _, secret = text[:MAXIMUM_LENGTH].partition(".")
         with self._database.connect() as connection:
-            row = connection.execute(_SHOWN, {"identifier": identifier}).one_or_none()
-        # One comparison whether or not there is such a token, and as long wherever the two differ.
-        same = hmac.compare_digest(_digest(secret), NOBODY if row is None else row.digest)
-        if row is None or not same or row.expires <= self._clock():
+            row = connection.execute(_BY_IDENTIFIER, {"identifier": identifier}).one_or_none()
+        # The comparison takes the same time whether or not the token exists, and wherever digests differ.
+        is_equal = hmac.compare_digest(_digest(secret), EMPTY_DIGEST if row is None else row.digest)
+        if row is None or not is_equal or row.expires <= self._clock():
             return None
         return Token.model_validate(row)
 
     def all(self) -> list[Token]:
-        """All tokens, also those that have expired; the oldest first."""
+        """Return all tokens, expired ones included, the oldest first."""
         with self._database.connect() as connection:
-            rows = connection.execute(select(*_SEEN).order_by(TokenRow.created, TokenRow.id))
+            rows = connection.execute(select(*_COLUMNS).order_by(TokenRow.created, TokenRow.id))
             return [Token.model_validate(row) for row in rows]
 
     def revoke(self, identifier: str) -> None:
-        """Make a token invalid at once.
+        """Make a token invalid from now on.
+
+        Parameters
+        ----------
+        identifier : str
+            The `id` of the token.
 
         Raises
         ------
         BadInput
-            If there is none of this identifier.
+            If there is no such token.
         """
         with self._database.begin() as connection:
             removed = connection.execute(delete(TokenRow).where(TokenRow.id == identifier))
         if not removed.rowcount:
-            raise BadInput(f"token: there is none with the id {identifier!r}")
+            raise BadInput(f"token: there is no token with the id {identifier!r}")
 
 
 def _digest(secret: str) -> str:
@@ -109,7 +147,17 @@ def _digest(secret: str) -> str:
 
 
 def tokens_table(tokens: Sequence[Token]) -> Table:
-    """Tokens, one a row."""
+    """Return a table of tokens for the terminal.
+
+    Parameters
+    ----------
+    tokens : sequence of Token
+
+    Returns
+    -------
+    Table
+        One row for each token.
+    """
     table = Table("id", "user", "scope", "created", "expires")
     for token in tokens:
         moments = (f"{moment:%Y-%m-%d %H:%M}" for moment in (token.created, token.expires))

@@ -26,7 +26,7 @@ class Moment(TypeDecorator[datetime]):
         return None if value is None else datetime.fromisoformat(value)
 
 
-class Table(DeclarativeBase):
+class ServiceTable(DeclarativeBase):
     """Base of the tables."""
 
     metadata = MetaData(
@@ -39,7 +39,7 @@ class Table(DeclarativeBase):
     type_annotation_map = {dict[str, Any]: JSON, datetime: Moment}  # noqa: RUF012
 
 
-class JobRow(Table):
+class JobRow(ServiceTable):
     """A job.
 
     `number` puts jobs in the order of their acceptance; `id` is how others name them.  `fingerprint` is that
@@ -80,7 +80,7 @@ class JobRow(Table):
     updated: Mapped[datetime]
 
 
-class TokenRow(Table):
+class TokenRow(ServiceTable):
     """A bearer token: who holds it, what it allows and until when; of its secret part only a digest."""
 
     __tablename__ = "tokens"

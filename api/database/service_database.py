@@ -1,64 +1,81 @@
-"""The database of the service: SQLite in the store, or PostgreSQL by its URL."""
+"""Access to the database of the service: SQLite in the store, or PostgreSQL by its URL."""
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Awaitable, Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
-from typing import Self
+from typing import ParamSpec, Protocol, Self, TypeVar
 
 from alembic import command
 from alembic.config import Config
 from sqlalchemy import Connection, Engine
+from starlette.concurrency import run_in_threadpool
 
 from ensemble.disk import locked
 from ensemble.errors import BadInput
-from ensemble.store.sql_database import UNUSABLE, engine, reason
+from ensemble.store.sql_database import UNUSABLE, engine, is_file, reason
 
 MIGRATIONS = "api:database/migrations"
 LOCK = "database.lock"
 
+Arguments = ParamSpec("Arguments")
+Result = TypeVar("Result")
+
 
 class Database(AbstractContextManager["Database"]):
-    """Connections to a database whose tables are up to date.  Get one from `Database.open`."""
+    """Connections to a database whose tables are up to date.
+
+    Call `Database.open` to get one.
+
+    Parameters
+    ----------
+    engine : Engine
+        SQLAlchemy's engine.
+    """
 
     def __init__(self, engine: Engine) -> None:
         self._engine = engine
-        # SQLite takes one writer at a time and lets the others sleep; threads that queue here lose no time.
-        one_writer = engine.dialect.name == "sqlite"
-        self._turn: AbstractContextManager[object] = threading.Lock() if one_writer else nullcontext()
+        # SQLite allows one writer at a time and lets others sleep and retry. Waiting for a lock is faster.
+        is_sqlite = engine.dialect.name == "sqlite"
+        self._write_lock: AbstractContextManager[object] = threading.Lock() if is_sqlite else nullcontext()
 
     @classmethod
     def open(cls, url: str, directory: Path) -> Self:
-        """Connect, and bring the tables up to date.
+        """Connect, and migrate the tables to the present version.
 
         Parameters
         ----------
         url : str
             For example ``sqlite:///jobs.sqlite`` or ``postgresql+psycopg://user@host/name``.
         directory : Path
-            That all processes of the service share; a lock in it lets one of them at a time change tables.
+            A directory that all processes of the service share. A lock file in it lets one process at a
+            time migrate tables.
+
+        Returns
+        -------
+        Database
 
         Raises
         ------
         BadInput
-            If there is no such database or it cannot be used.
+            If the database does not exist or cannot be used.
         """
         try:
             database = cls(engine(url))
             with locked(directory / LOCK):
-                database._upgrade()
+                database._migrate()
         except UNUSABLE as error:
             raise BadInput(f"database: it cannot be used ({reason(error)})") from error
         return database
 
     @property
     def dialect(self) -> str:
-        """Which SQL it speaks, in SQLAlchemy's words."""
+        """Name of the SQL dialect in SQLAlchemy: ``sqlite`` or ``postgresql``."""
         return self._engine.dialect.name
 
-    def _upgrade(self) -> None:
+    def _migrate(self) -> None:
         config = Config()
         config.set_main_option("script_location", MIGRATIONS)
         with self._engine.begin() as connection:
@@ -67,12 +84,12 @@ class Database(AbstractContextManager["Database"]):
 
     @contextmanager
     def begin(self) -> Iterator[Connection]:
-        """Give a connection for a change, which is durable when the block ends and undone if it fails."""
-        with self._turn, self._engine.begin() as connection:
+        """Open a transaction: durable when the block ends, rolled back if the block raises."""
+        with self._write_lock, self._engine.begin() as connection:
             yield connection
 
     def connect(self) -> AbstractContextManager[Connection]:
-        """Give a connection for reading."""
+        """Open a connection for reading."""
         return self._engine.connect()
 
     def close(self) -> None:
@@ -81,3 +98,84 @@ class Database(AbstractContextManager["Database"]):
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+class LookUp(Protocol):
+    """How coroutines read one record: `read_inline` or `read_in_thread`."""
+
+    def __call__(
+        self,
+        read: Callable[Arguments, Result],
+        /,
+        *arguments: Arguments.args,
+        **named: Arguments.kwargs,
+    ) -> Awaitable[Result]:
+        """Call `read` with the arguments and return its result.
+
+        Parameters
+        ----------
+        read : callable
+        *arguments, **named
+            Arguments of `read`.
+
+        Returns
+        -------
+        awaitable
+        """
+        ...
+
+
+async def read_inline(
+    read: Callable[Arguments, Result], /, *arguments: Arguments.args, **named: Arguments.kwargs
+) -> Result:
+    """Call a function in the event loop itself; see `LookUp`.
+
+    Parameters
+    ----------
+    read : callable
+    *arguments, **named
+        Arguments of `read`.
+
+    Returns
+    -------
+    object
+        The result of `read`.
+    """
+    return read(*arguments, **named)
+
+
+async def read_in_thread(
+    read: Callable[Arguments, Result], /, *arguments: Arguments.args, **named: Arguments.kwargs
+) -> Result:
+    """Call a function in another thread; see `LookUp`.
+
+    Parameters
+    ----------
+    read : callable
+    *arguments, **named
+        Arguments of `read`.
+
+    Returns
+    -------
+    object
+        The result of `read`.
+    """
+    return await run_in_threadpool(read, *arguments, **named)
+
+
+def look_up_for(urls: Iterable[str]) -> LookUp:
+    """Choose how coroutines read single records from databases.
+
+    Parameters
+    ----------
+    urls : iterable of str
+        URLs of the databases. A file is read in less time than a switch to another thread takes; a server
+        may take long, and must not block the event loop.
+
+    Returns
+    -------
+    LookUp
+    """
+    if all(is_file(url) for url in urls):
+        return read_inline
+    return read_in_thread

@@ -1,1 +1,1 @@
-"""What every request passes through, and the shape of every answer."""
+"""How the service speaks HTTP: errors, limits, headers, pages and tags. Knows nothing of jobs or runs."""

@@ -1,4 +1,4 @@
-"""ETags: a client that has a document already is told so instead of being sent it again."""
+"""Answers with an ETag: a client that already has the document gets 304 instead of a second copy."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from fastapi import Request, Response
 from pydantic import BaseModel
 
 JSON = "application/json"
-FOR_EVER = "private, max-age=31536000, immutable"
-ASK_AGAIN = "private, no-cache"
+IMMUTABLE = "private, max-age=31536000, immutable"
+REVALIDATE = "private, no-cache"
 
 NOT_MODIFIED: dict[int | str, dict[str, Any]] = {
     HTTPStatus.NOT_MODIFIED.value: {
@@ -22,32 +22,57 @@ NOT_MODIFIED: dict[int | str, dict[str, Any]] = {
 
 
 def etag(*parts: str) -> str:
-    """Make the tag of a document from what identifies its contents."""
+    """Return an entity tag for a document.
+
+    Parameters
+    ----------
+    *parts : str
+        Everything that determines the document's content.
+
+    Returns
+    -------
+    str
+        The tag, in quotes.
+    """
     return f'"{hashlib.sha256("/".join(parts).encode()).hexdigest()[:32]}"'
 
 
-def written(document: BaseModel | str) -> Response:
-    """Answer with a document as it is: it needs no second validation on its way out."""
+def json_response(document: BaseModel | str) -> Response:
+    """Return a JSON answer without the second validation that FastAPI would do.
+
+    Parameters
+    ----------
+    document : BaseModel or str
+        A model, or text that is JSON already.
+
+    Returns
+    -------
+    Response
+    """
     return Response(document if isinstance(document, str) else document.model_dump_json(), media_type=JSON)
 
 
-def cached(request: Request, tag: str, control: str, make: Callable[[], Response]) -> Response:
-    """Answer with a document, which is made only if the client does not have the one of this tag.
+def cached_response(request: Request, tag: str, cache_control: str, make: Callable[[], Response]) -> Response:
+    """Return 304 if the client has the document of this tag, else the document.
 
     Parameters
     ----------
     request : Request
     tag : str
         From `etag`.
-    control : str
-        `FOR_EVER` for what never changes, else `ASK_AGAIN`.
+    cache_control : str
+        `IMMUTABLE` for a document that never changes, else `REVALIDATE`.
     make : callable
-        Makes the whole answer.
+        Makes the full answer; called only if it is needed.
+
+    Returns
+    -------
+    Response
     """
     candidates = request.headers.get("if-none-match", "").split(",")
-    has_it = tag in (candidate.strip().removeprefix("W/") for candidate in candidates)
-    response = Response(status_code=HTTPStatus.NOT_MODIFIED) if has_it else make()
+    is_current = tag in (candidate.strip().removeprefix("W/") for candidate in candidates)
+    response = Response(status_code=HTTPStatus.NOT_MODIFIED) if is_current else make()
     response.headers["ETag"] = tag
-    response.headers["Cache-Control"] = control
+    response.headers["Cache-Control"] = cache_control
     response.headers["Vary"] = "Accept, Authorization"
     return response

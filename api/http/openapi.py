@@ -1,7 +1,8 @@
-"""The description of the service in OpenAPI: what FastAPI finds out, and models that it is not told of."""
+"""The OpenAPI description of the service, with the models that FastAPI does not add by itself."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 from fastapi import FastAPI
@@ -9,27 +10,15 @@ from pydantic import BaseModel
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaMode, JsonSchemaValue
 from pydantic_core.core_schema import FloatSchema
 
-from api.http.problems import ProblemDocument
-from api.http.schemas import Submission
-from ensemble.store.run_record import RunSummary
-
-PLACE = "#/components/schemas/{model}"
+SCHEMA_REFERENCE = "#/components/schemas/{model}"
 NON_FINITE = ["NaN", "Infinity", "-Infinity"]
 
-# Problems and submissions are written and read without FastAPI; for a run, it knows of no number that is not
-# finite, which a failed one may hold.
-MODELS: tuple[tuple[type[BaseModel], JsonSchemaMode], ...] = (
-    (ProblemDocument, "serialization"),
-    (Submission, "validation"),
-    (RunSummary, "serialization"),
-)
 
-
-class _WithNonFinite(GenerateJsonSchema):
-    """Says of a number that is written as a string, where it is not finite, that it may be one."""
+class _NonFiniteSchema(GenerateJsonSchema):
+    """Describes numbers that are serialized as strings where they are not finite."""
 
     def float_schema(self, schema: FloatSchema) -> JsonSchemaValue:
-        """Describe a number."""
+        """See `GenerateJsonSchema`."""
         described = super().float_schema(schema)
         if self.mode == "serialization" and self._config.ser_json_inf_nan == "strings":
             return {"anyOf": [described, {"enum": NON_FINITE}]}
@@ -37,13 +26,34 @@ class _WithNonFinite(GenerateJsonSchema):
 
 
 def reference(model: type[BaseModel]) -> dict[str, Any]:
-    """Refer to one of `MODELS`."""
-    return {"$ref": PLACE.format(model=model.__name__)}
+    """Return a JSON Schema reference to a model of the description.
+
+    Parameters
+    ----------
+    model : type
+        A pydantic model; `add_models` must put it into the description.
+
+    Returns
+    -------
+    dict
+    """
+    return {"$ref": SCHEMA_REFERENCE.format(model=model.__name__)}
 
 
-def complete(app: FastAPI) -> None:
-    """Put the models into the description of an application that has all of its routes."""
+def add_models(app: FastAPI, models: Iterable[tuple[type[BaseModel], JsonSchemaMode]]) -> None:
+    """Add models to the description of an application.
+
+    Parameters
+    ----------
+    app : FastAPI
+        An application that has all of its routes.
+    models : iterable of (type, str)
+        Models that FastAPI does not know because routes read or write them without its help, or that it
+        describes incompletely.  Each with its mode: ``validation`` for input, ``serialization`` for output.
+    """
     schemas = app.openapi()["components"]["schemas"]
-    for model, mode in MODELS:
-        schema = model.model_json_schema(mode=mode, schema_generator=_WithNonFinite, ref_template=PLACE)
+    for model, mode in models:
+        schema = model.model_json_schema(
+            mode=mode, schema_generator=_NonFiniteSchema, ref_template=SCHEMA_REFERENCE
+        )
         schemas |= schema.pop("$defs", {}) | {model.__name__: schema}

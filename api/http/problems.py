@@ -1,9 +1,9 @@
-"""Errors as RFC 9457 describes them: `application/problem+json`, one shape for all."""
+"""Errors in one form for all routes: `application/problem+json` (RFC 9457)."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from http import HTTPStatus
 from typing import Any
 
@@ -13,19 +13,17 @@ from pydantic import BaseModel, ConfigDict
 from pydantic_core import ErrorDetails
 from starlette.exceptions import HTTPException
 
-from api.jobs.job import NoSuchJob
 from ensemble.config.validation import describe
 from ensemble.errors import BadInput
-from ensemble.store import NotStored
 
 MEDIA_TYPE = "application/problem+json"
-MOST_FOUND = 10  # wrong fields that one answer names
+MAXIMUM_FIELDS = 10  # invalid fields that one answer names
 
 
 class ProblemDocument(BaseModel):
-    """What is wrong with a request: `title` names the status, `detail` the field and what is allowed.
+    """An error: `title` is the name of the status, `detail` names the field and the allowed range.
 
-    Some problems carry further members, such as `cost` and `maximum`.
+    Some problems have additional members, for example `cost` and `maximum`.
     """
 
     model_config = ConfigDict(extra="allow")
@@ -37,17 +35,18 @@ class ProblemDocument(BaseModel):
 
 
 class Problem(Exception):  # noqa: N818
-    """Answers the request with a problem.
+    """An error that becomes the answer to the request.
 
     Parameters
     ----------
     status : HTTPStatus
+        Status of the answer.
     detail : str
-        One sentence that names the field and what it allows.
+        One sentence that names the field and the allowed range.
     headers : mapping, optional
-        Of the answer.
-    members
-        Further members of the document.
+        Headers of the answer.
+    **members
+        Additional members of the document.
     """
 
     def __init__(
@@ -60,12 +59,48 @@ class Problem(Exception):  # noqa: N818
         self.members = members
 
 
-def problem_response(problem: Problem) -> Response:
-    """Write a problem as a response."""
+def documented(*statuses: HTTPStatus) -> dict[int | str, dict[str, Any]]:
+    """Return the OpenAPI description of problems that a route may answer with.
+
+    Parameters
+    ----------
+    *statuses : HTTPStatus
+        Statuses of the problems.
+
+    Returns
+    -------
+    dict
+        For the argument `responses` of a route.
+    """
+    schema = {"schema": {"$ref": "#/components/schemas/ProblemDocument"}}
+    return {
+        status.value: {"description": status.phrase, "content": {MEDIA_TYPE: schema}} for status in statuses
+    }
+
+
+def install_handlers(app: FastAPI, missing: Iterable[type[Exception]]) -> None:
+    """Turn every error of an application into a problem.
+
+    Parameters
+    ----------
+    app : FastAPI
+    missing : iterable of type
+        Exceptions that mean that there is no such resource: status 404.
+    """
+    app.add_exception_handler(Problem, _problem)
+    app.add_exception_handler(HTTPException, _http_error)
+    app.add_exception_handler(RequestValidationError, _validation_error)
+    app.add_exception_handler(BadInput, _bad_input)
+    for error in missing:
+        app.add_exception_handler(error, _missing_resource)
+    app.add_exception_handler(Exception, _server_error)
+
+
+def _response(problem: Problem) -> Response:
     document = ProblemDocument(
         title=problem.status.phrase, status=problem.status, detail=problem.detail, **problem.members
     )
-    # Escaped to ASCII: what is quoted from a request may hold characters that UTF-8 has no bytes for.
+    # Escaped to ASCII: the detail may quote characters of the request that cannot be encoded as UTF-8.
     return Response(
         json.dumps(document.model_dump(mode="json")),
         status_code=problem.status,
@@ -74,62 +109,39 @@ def problem_response(problem: Problem) -> Response:
     )
 
 
-def invalid(found: Sequence[ErrorDetails]) -> Problem:
-    """Make the problem of a document, or a query, in which pydantic has found fields that are wrong."""
-    return Problem(HTTPStatus.UNPROCESSABLE_ENTITY, describe(found[:MOST_FOUND], {}))
-
-
-def documented(*statuses: HTTPStatus) -> dict[int | str, dict[str, Any]]:
-    """Describe in OpenAPI that a route may answer with these problems."""
-    schema = {"schema": {"$ref": "#/components/schemas/ProblemDocument"}}
-    return {
-        status.value: {"description": status.phrase, "content": {MEDIA_TYPE: schema}} for status in statuses
-    }
-
-
-def install(app: FastAPI) -> None:
-    """Make every error of an application a problem."""
-    app.add_exception_handler(Problem, _of_problem)
-    app.add_exception_handler(HTTPException, _of_http)
-    app.add_exception_handler(RequestValidationError, _of_validation)
-    app.add_exception_handler(BadInput, _of_bad_input)
-    app.add_exception_handler(NotStored, _of_missing)
-    app.add_exception_handler(NoSuchJob, _of_missing)
-    app.add_exception_handler(Exception, _of_accident)
-
-
-def _of_problem(_: Request, error: Exception) -> Response:
+def _problem(_: Request, error: Exception) -> Response:
     assert isinstance(error, Problem)
-    return problem_response(error)
+    return _response(error)
 
 
-def _of_http(request: Request, error: Exception) -> Response:
+def _http_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
     status = HTTPStatus(error.status_code)
     headers = dict(error.headers or {})
     if status is HTTPStatus.METHOD_NOT_ALLOWED:
-        # The framework names the methods of the first of several routes at this path.
+        # The framework names the methods of the first route at this path; there may be several.
         described = request.app.openapi()["paths"].get(request.scope["route"].path, {})
         headers["Allow"] = ", ".join(sorted(described)).upper() or headers["Allow"]
-    return problem_response(Problem(status, error.detail, headers))
+    return _response(Problem(status, error.detail, headers))
 
 
-def _of_validation(_: Request, error: Exception) -> Response:
+def _validation_error(_: Request, error: Exception) -> Response:
     assert isinstance(error, RequestValidationError)
-    # The first part of a location says where it was: in the query, the path or a header.
-    return problem_response(invalid([problem | {"loc": problem["loc"][1:]} for problem in error.errors()]))
+    # The first part of a location is "query", "path" or "header".
+    errors: Sequence[ErrorDetails] = [details | {"loc": details["loc"][1:]} for details in error.errors()]
+    return _response(Problem(HTTPStatus.UNPROCESSABLE_ENTITY, describe(errors[:MAXIMUM_FIELDS], {})))
 
 
-def _of_missing(request: Request, _: Exception) -> Response:
-    return problem_response(Problem(HTTPStatus.NOT_FOUND, f"there is nothing at {request.url.path}"))
+def _bad_input(_: Request, error: Exception) -> Response:
+    return _response(Problem(HTTPStatus.UNPROCESSABLE_ENTITY, str(error)))
 
 
-def _of_bad_input(_: Request, error: Exception) -> Response:
-    return problem_response(Problem(HTTPStatus.UNPROCESSABLE_ENTITY, str(error)))
+def _missing_resource(request: Request, _: Exception) -> Response:
+    return _response(Problem(HTTPStatus.NOT_FOUND, f"there is nothing at {request.url.path}"))
 
 
-def _of_accident(_: Request, __: Exception) -> Response:
-    # What went wrong is in the server's log, and no business of a client's.
-    return problem_response(
-        Problem(HTTPStatus.INTERNAL_SERVER_ERROR, "the server made a mistake; it is logged")
+def _server_error(_: Request, __: Exception) -> Response:
+    # Details are in the server's log only: they are of no use to a client and may reveal internals.
+    return _response(
+        Problem(HTTPStatus.INTERNAL_SERVER_ERROR, "internal error of the server; its log has the details")
     )

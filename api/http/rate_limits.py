@@ -1,4 +1,4 @@
-"""Bounds on what one user, or one address, may ask for in a while."""
+"""Limits on how many requests a user may make, and how many invalid tokens an address may send."""
 
 from __future__ import annotations
 
@@ -14,32 +14,59 @@ from api.http.problems import Problem
 
 
 class RateLimits:
-    """Counts requests of users, and refused tokens by address.
+    """Counts of requests by user and of invalid tokens by address, in the memory of this process.
 
     Parameters
     ----------
-    request_rate, refusal_rate : str
-        As the library `limits` reads them, such as ``100/second``.
+    request_rate : str
+        Largest rate of requests of one user, in the notation of the library `limits`: ``100/second``.
+    invalid_token_rate : str
+        Largest rate of invalid tokens from one address.
     """
 
-    def __init__(self, request_rate: str, refusal_rate: str) -> None:
+    def __init__(self, request_rate: str, invalid_token_rate: str) -> None:
         self._requests = parse(request_rate)
-        self._refusals = parse(refusal_rate)
+        self._invalid_tokens = parse(invalid_token_rate)
         self._limiter = FixedWindowRateLimiter(MemoryStorage())
 
-    async def check_rate(self, user: str) -> None:
-        """Count a request, and refuse it if its user has made too many."""
+    async def count_request(self, user: str) -> None:
+        """Count a request of a user.
+
+        Parameters
+        ----------
+        user : str
+
+        Raises
+        ------
+        Problem
+            If the user has made too many requests.
+        """
         if not await self._limiter.hit(self._requests, "user", user):
             await self._refuse(self._requests, "user", user)
 
-    async def check_refusals(self, address: str) -> None:
-        """Refuse an address from which too many bad tokens came."""
-        if not await self._limiter.test(self._refusals, "address", address):
-            await self._refuse(self._refusals, "address", address)
+    async def check_address(self, address: str) -> None:
+        """Check that not too many invalid tokens came from an address.
 
-    async def count_refusal(self, address: str) -> None:
-        """Count a bad token from an address."""
-        await self._limiter.hit(self._refusals, "address", address)
+        Parameters
+        ----------
+        address : str
+
+        Raises
+        ------
+        Problem
+            If too many came. Valid tokens are refused as well until the time window ends.
+        """
+        if not await self._limiter.test(self._invalid_tokens, "address", address):
+            await self._refuse(self._invalid_tokens, "address", address)
+
+    async def count_invalid_token(self, address: str) -> None:
+        """Count an invalid token from an address.
+
+        Parameters
+        ----------
+        address : str
+        """
+        await self._limiter.hit(self._invalid_tokens, "address", address)
 
     async def _refuse(self, item: RateLimitItem, *identifiers: str) -> None:
         reset = (await self._limiter.get_window_stats(item, *identifiers)).reset_time

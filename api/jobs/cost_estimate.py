@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 import sys
 
-from api.http.schemas import Estimate
+from pydantic import BaseModel
+
 from ensemble.config.certifying_scene import certifying_scene
 from ensemble.config.geometric_grid import GeometricGrid
 from ensemble.config.study import Study
@@ -18,6 +19,18 @@ MOST_RECORDED_POINTS = 100_000_000
 
 _AUTOMATIC_POINTS = 128  # what "auto" is taken for: most scenes end with fewer
 _CONTRAST = 8.0  # how much longer a step takes with a viscosity contrast: at 64 points 5 to 9 times, measured
+
+
+class Estimate(BaseModel):
+    """Upper bound of the cost of a job: points × vesicles × time to simulate, over all its `runs`.
+
+    A job whose `cost` is above `maximum` is refused.
+    """
+
+    runs: int
+    cost: float
+    maximum: float
+    accepted: bool
 
 
 def estimate(asked: Study | Scene, maximum: float) -> Estimate:

@@ -28,7 +28,7 @@ class Kind(StrEnum):
     SCENE = "scene"
 
 
-class Status(StrEnum):
+class JobStatus(StrEnum):
     """Where a job stands; the words are those of OGC API Processes."""
 
     ACCEPTED = "accepted"
@@ -43,7 +43,7 @@ class Status(StrEnum):
         return self not in UNFINISHED
 
 
-UNFINISHED = (Status.ACCEPTED, Status.RUNNING)
+UNFINISHED = (JobStatus.ACCEPTED, JobStatus.RUNNING)
 
 
 class NoSuchJob(BadInput):
@@ -74,7 +74,7 @@ class Job(BaseModel):
         Processes that the job uses.
     seconds : float
         How long one attempt may take.
-    status : Status
+    status : JobStatus
     progress : int
         From 0 to 100.  It never falls.
     message : str
@@ -95,7 +95,7 @@ class Job(BaseModel):
     key: str
     ranks: int
     seconds: float
-    status: Status
+    status: JobStatus
     progress: int
     message: str
     attempts: int

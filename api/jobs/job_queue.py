@@ -30,9 +30,9 @@ from sqlalchemy import (
 from api.database.database_tables import JobRow
 from api.database.service_database import Database
 from api.jobs.intake import Intake
-from api.jobs.job import UNFINISHED, IdempotencyConflict, Job, Lease, Status, TooManyJobs, Work
+from api.jobs.job import UNFINISHED, IdempotencyConflict, Job, JobStatus, Lease, TooManyJobs, Work
 from api.jobs.job_records import JobRecords
-from api.worker.worker_name import has_died
+from api.jobs.worker_name import has_died
 from ensemble.timestamp import now
 
 LEASE_SECONDS = 3.0
@@ -114,7 +114,7 @@ class Jobs:
             key=work.key,
             ranks=ranks,
             seconds=seconds,
-            status=Status.ACCEPTED,
+            status=JobStatus.ACCEPTED,
             progress=0,
             message="waiting for a worker",
             attempts=0,
@@ -185,7 +185,7 @@ class Jobs:
             return connection.execute(select(JobRow.document).where(JobRow.id == job.id)).scalar_one()
 
     def latest(
-        self, limit: int, after: str | None = None, owner: str | None = None, status: Status | None = None
+        self, limit: int, after: str | None = None, owner: str | None = None, status: JobStatus | None = None
     ) -> list[Job]:
         """Return jobs, the latest first: at most `limit`, from the one that follows `after`.
 
@@ -197,12 +197,12 @@ class Jobs:
         found = self.records.page(limit, after, owner, status)
         return [Job.model_validate_json(record.json) for record in found]
 
-    def counts(self) -> dict[Status, int]:
+    def counts(self) -> dict[JobStatus, int]:
         """Say how many jobs there are of each status."""
         query = select(JobRow.status, func.count()).group_by(JobRow.status)
         with self._database.connect() as connection:
-            found = {Status(status): count for status, count in connection.execute(query)}
-        return {status: found.get(status, 0) for status in Status}
+            found = {JobStatus(status): count for status, count in connection.execute(query)}
+        return {status: found.get(status, 0) for status in JobStatus}
 
     def dismiss(self, identifier: str) -> Job:
         """Give a job up, and return it; one that is finished stays as it is.
@@ -214,23 +214,23 @@ class Jobs:
         NoSuchJob
         """
         unfinished = update(JobRow).where(JobRow.id == identifier, JobRow.status.in_(UNFINISHED))
-        self._change(self._ended(unfinished, Status.DISMISSED, "dismissed"))
+        self._change(self._ended(unfinished, JobStatus.DISMISSED, "dismissed"))
         return self.get(identifier)
 
     def lease(self, worker: str) -> Lease | None:
-        """Take the next job for a worker, named by `api.worker.worker_name`; None if there is none to be had.
+        """Take the next job for a worker, named by `api.jobs.worker_name`; None if there is none to be had.
 
         It is the oldest one of the owner who has the fewest running.  A job whose worker has let its lease
         run out, or is seen to have died, takes part again.
         """
         moment = self._clock()
-        running = select(JobRow.worker).where(JobRow.status == Status.RUNNING)
+        running = select(JobRow.worker).where(JobRow.status == JobStatus.RUNNING)
         expires = moment + timedelta(seconds=LEASE_SECONDS)
         take = (
             update(JobRow)
-            .where(JobRow.number == _next_number(), JobRow.status == Status.ACCEPTED)
+            .where(JobRow.number == _next_number(), JobRow.status == JobStatus.ACCEPTED)
             .values(
-                status=Status.RUNNING,
+                status=JobStatus.RUNNING,
                 message="starting",
                 attempts=JobRow.attempts + 1,
                 worker=worker,
@@ -244,7 +244,9 @@ class Jobs:
             dead = [name for name in connection.scalars(running) if name is not None and has_died(name)]
             lost = (
                 update(JobRow)
-                .where(JobRow.status == Status.RUNNING, or_(JobRow.expires < moment, JobRow.worker.in_(dead)))
+                .where(
+                    JobRow.status == JobStatus.RUNNING, or_(JobRow.expires < moment, JobRow.worker.in_(dead))
+                )
                 .values(_waiting("its worker was lost; waiting for another one", moment))
             )
             connection.execute(lost)
@@ -263,7 +265,7 @@ class Jobs:
             )
         )
 
-    def finish(self, lease: Lease, status: Status, message: str) -> bool:
+    def finish(self, lease: Lease, status: JobStatus, message: str) -> bool:
         """End a job; False if it is no longer this worker's, which then changes nothing."""
         return self._change(self._ended(_leased(lease), status, message))
 
@@ -275,12 +277,12 @@ class Jobs:
         """Return the file that holds what the job's processes have said; it may not be there yet."""
         return self._directory / f"{job.id}.log"
 
-    def _ended(self, whose: Update, status: Status, message: str) -> Update:
+    def _ended(self, whose: Update, status: JobStatus, message: str) -> Update:
         moment = self._clock()
         ended = whose.values(
             status=status, message=message, worker=None, expires=None, finished=moment, updated=moment
         )
-        return ended.values(progress=100) if status is Status.SUCCEEDED else ended
+        return ended.values(progress=100) if status is JobStatus.SUCCEEDED else ended
 
     def _change(self, statement: Update) -> bool:
         with self._database.begin() as connection:
@@ -295,13 +297,13 @@ def _fingerprint(work: Work, ranks: int, seconds: float) -> str:
 def _next_number() -> ScalarSelect[int]:
     waiting = (
         select(JobRow.owner, func.min(JobRow.number).label("number"))
-        .where(JobRow.status == Status.ACCEPTED)
+        .where(JobRow.status == JobStatus.ACCEPTED)
         .group_by(JobRow.owner)
         .subquery()
     )
     running = (
         select(JobRow.owner, func.count().label("jobs"))
-        .where(JobRow.status == Status.RUNNING)
+        .where(JobRow.status == JobStatus.RUNNING)
         .group_by(JobRow.owner)
         .subquery()
     )
@@ -316,7 +318,7 @@ def _next_number() -> ScalarSelect[int]:
 
 def _waiting(message: str, moment: datetime) -> dict[str, Any]:
     return {
-        "status": Status.ACCEPTED,
+        "status": JobStatus.ACCEPTED,
         "message": message,
         "worker": None,
         "expires": None,
@@ -328,6 +330,6 @@ def _leased(lease: Lease) -> Update:
     """Change a job only while this very lease holds: the attempt is the fencing token."""
     return update(JobRow).where(
         JobRow.id == lease.job.id,
-        JobRow.status == Status.RUNNING,
+        JobRow.status == JobStatus.RUNNING,
         JobRow.attempts == lease.job.attempts,
     )

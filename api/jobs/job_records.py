@@ -10,7 +10,7 @@ from sqlalchemy import ColumnElement, Integer, Row, Select, String, bindparam, s
 
 from api.database.database_tables import JobRow, Moment
 from api.database.service_database import Database
-from api.jobs.job import Job, NoSuchJob, Status
+from api.jobs.job import Job, JobStatus, NoSuchJob
 from ensemble.store import Record
 
 
@@ -60,7 +60,7 @@ class JobRecords:
         return _record(row)
 
     def page(
-        self, limit: int, after: str | None = None, owner: str | None = None, status: Status | None = None
+        self, limit: int, after: str | None = None, owner: str | None = None, status: JobStatus | None = None
     ) -> list[Record]:
         """Return jobs, the latest first: at most `limit`, from the one that follows `after`.
 

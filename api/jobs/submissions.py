@@ -4,37 +4,58 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from http import HTTPStatus
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 from cachetools import LRUCache
-from fastapi import Depends, Request
-from fastapi.concurrency import run_in_threadpool
-from pydantic import ValidationError
+from pydantic import BaseModel, Field, JsonValue, ValidationError, model_validator
 from pydantic_core import from_json
+from starlette.concurrency import run_in_threadpool
 
-from api.http.problems import Problem, invalid
-from api.http.schemas import Estimate, Submission
-from api.jobs.cost_estimate import estimate
+from api.jobs.cost_estimate import Estimate, estimate
 from api.jobs.job import Kind, Work, preset_work, scene_work, study_work
 from api.jobs.size_limits import limit_scene, limit_study
 from ensemble.config.documents import preset_document
 from ensemble.config.overrides import override
+from ensemble.config.study import Study
+from ensemble.config.validation import describe
 from ensemble.errors import BadInput
+from solver.scene import Model, Scene
 
+MAXIMUM_FIELDS = 10  # invalid fields that one message names
 MOST_KNOWN = 256
 LONGEST_KNOWN = 4096  # bytes
 
 
-async def body_of(request: Request) -> bytes:
-    """Return the body of a request, which says that it is JSON."""
-    kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
-    if kind != "application/json":
-        raise Problem(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, f"Content-Type: {kind!r} — must be application/json")
-    return await request.body()
+class Submission(Model):
+    """What to simulate: a preset by its name, a study or a scene, with changes by dotted path.
+
+    Exactly one of `preset`, `study` and `scene` is given. `ranks` is the number of processes of the job,
+    `seconds` the time limit of an attempt. By default a study gets as many ranks as a job may have, a scene
+    one, and either gets the longest time limit.
+    """
+
+    preset: str | None = None
+    study: Study | None = None
+    scene: Scene | None = None
+    set: dict[Annotated[str, Field(max_length=200)], JsonValue] = Field({}, max_length=100)
+    ranks: int | None = Field(None, ge=1)
+    seconds: float | None = Field(None, gt=0)
+
+    @model_validator(mode="after")
+    def _one_document(self) -> Self:
+        given = [name for name in ("preset", "study", "scene") if getattr(self, name) is not None]
+        if len(given) != 1:
+            raise ValueError(f"give one of preset, study and scene, not {' and '.join(given) or 'none'}")
+        return self
 
 
-Body = Annotated[bytes, Depends(body_of)]
+class PresetDocument(BaseModel):
+    """A study or a scene that ships with the package, with all fields, and its largest cost."""
+
+    name: str
+    kind: Kind
+    document: dict[str, Any]
+    estimate: Estimate
 
 
 @dataclass(frozen=True)
@@ -62,7 +83,7 @@ class Submissions:
 
         Raises
         ------
-        Problem, BadInput
+        BadInput
             If it is nothing that can be done; names the field.
         """
         asked = self._known.get(body)
@@ -88,7 +109,8 @@ def read_submission(body: bytes) -> Submission:
             limit_scene(document.get("scene"))
         return Submission.model_validate_json(body, strict=True)
     except ValidationError as error:
-        raise invalid(error.errors(include_url=False)) from error
+        errors = error.errors(include_url=False)[:MAXIMUM_FIELDS]
+        raise BadInput(describe(errors, {})) from error
     except ValueError as error:
         raise BadInput(f"body: {error}") from error
 

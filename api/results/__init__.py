@@ -1,1 +1,1 @@
-"""Stored runs and boundaries as a client reads them."""
+"""Stored runs and boundaries in the form in which clients read them."""

@@ -1,117 +1,175 @@
-"""What is read off the points of a boundary: a line through them, and values between them."""
+"""Values read from the points of a boundary: a line through them, and critical values between them."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import StrEnum
 from functools import lru_cache
 
 import numpy as np
 from numpy.polynomial import Polynomial
+from pydantic import BaseModel
 
-from api.http.schemas import BoundaryDocument, CriticalValueAt, Method
 from ensemble.errors import BadInput
 from ensemble.search.boundary import Boundary, BoundaryPoint
 from ensemble.search.critical_value import Status
-from ensemble.search.line import line_through
+from ensemble.search.line import Line, line_through
 
-MOST_FITTED = 256  # boundaries that are kept as they were sent
+CACHED_BOUNDARIES = 256  # documents that are kept as they were sent
+
+
+class BoundaryDocument(Boundary):
+    """A boundary, and the line through its converged points if there are three or more."""
+
+    fit: Line | None
+
+
+class ReadingMethod(StrEnum):
+    """How a critical value is read from a boundary."""
+
+    INTERPOLATED = "interpolated"
+    NEAREST = "nearest"
+
+
+class CriticalValueDocument(BaseModel):
+    """A critical value read from a boundary.
+
+    Attributes
+    ----------
+    parameters : dict
+        Value of the swept parameter: the requested one or, with ``nearest``, that of the nearest point.
+    critical_value : float
+    uncertainty : (float, float)
+        Interval that contains the critical value: the bracket of a point; between two points the
+        interpolated brackets, widened by the largest deviation of a parabola through a third point from
+        the straight line.
+    method : ReadingMethod
+    points : list
+        Parameters of the points that were used.
+    """
+
+    parameters: dict[str, float]
+    critical_value: float
+    uncertainty: tuple[float, float]
+    method: ReadingMethod
+    points: list[dict[str, float]]
 
 
 @dataclass(frozen=True)
-class _Known:
-    """A point whose bracket is closed, and the value of the swept parameter there."""
+class _ConvergedPoint:
+    """A point with a closed bracket, and the value of the swept parameter there."""
 
-    at: float
+    swept: float
     value: float
     low: float
     high: float
     point: BoundaryPoint
 
 
-def _known(boundary: Boundary) -> list[_Known]:
-    swept = boundary.study["sweep"]["parameter"]
-    points = [
-        _Known(point.parameters[swept], point.critical_value, low, high, point)
-        for point in boundary.points
-        if point.status == Status.CONVERGED and point.critical_value is not None
-        for low, high in [point.bracket]
-        if low is not None and high is not None
-    ]
-    return sorted(points, key=lambda known: known.at)
+@lru_cache(CACHED_BOUNDARIES)
+def fitted_boundary(recorded: str) -> str:
+    """Add the line through its points to a boundary.
 
+    Parameters
+    ----------
+    recorded : str
+        JSON of a `Boundary`.
 
-@lru_cache(MOST_FITTED)
-def fitted(recorded: str) -> str:
-    """Add to the JSON of a boundary the line through its points."""
+    Returns
+    -------
+    str
+        JSON of a `BoundaryDocument`.
+    """
     boundary = Boundary.model_validate_json(recorded)
     document = BoundaryDocument.model_validate(boundary.model_dump() | {"fit": line_through(boundary)})
     return document.model_dump_json()
 
 
-def critical_value_at(boundary: Boundary, parameters: Mapping[str, float], method: Method) -> CriticalValueAt:
-    """Read a critical value off the converged points of a boundary.
+def critical_value_at(
+    boundary: Boundary, parameters: Mapping[str, float], method: ReadingMethod
+) -> CriticalValueDocument:
+    """Read a critical value from the converged points of a boundary.
 
     Parameters
     ----------
     boundary : Boundary
     parameters : mapping
-        Value of the swept parameter, by its dotted path.
-    method : Method
-        Between two points, or of the nearest one.
+        Value of the swept parameter by its dotted path.
+    method : ReadingMethod
+        Interpolate between two points, or take the nearest point.
+
+    Returns
+    -------
+    CriticalValueDocument
 
     Raises
     ------
     BadInput
-        If the parameters are not those of the boundary, or lie outside of what is known of it.
+        If other parameters are given than the swept one, or its value lies outside the converged points.
     """
-    swept = boundary.study["sweep"]["parameter"]
-    if parameters.keys() != {swept}:
-        raise BadInput(f"give a value of {swept} and of nothing else")
-    known = _known(boundary)
-    if not known:
-        raise BadInput(f"{swept}: no point of this boundary has converged yet")
-    at = parameters[swept]
-    nearest = min(known, key=lambda point: abs(point.at - at))
-    if method is Method.NEAREST or nearest.at == at:
-        return CriticalValueAt(
+    name = boundary.study["sweep"]["parameter"]
+    if parameters.keys() != {name}:
+        raise BadInput(f"give a value of {name} and of nothing else")
+    points = _converged_points(boundary, name)
+    if not points:
+        raise BadInput(f"{name}: no point of this boundary has converged yet")
+    swept = parameters[name]
+    nearest = min(points, key=lambda point: abs(point.swept - swept))
+    if method is ReadingMethod.NEAREST or nearest.swept == swept:
+        return CriticalValueDocument(
             parameters=nearest.point.parameters,
             critical_value=nearest.value,
             uncertainty=(nearest.low, nearest.high),
             method=method,
             points=[nearest.point.parameters],
         )
-    if not known[0].at < at < known[-1].at:
+    if not points[0].swept < swept < points[-1].swept:
         raise BadInput(
-            f"{swept}: {at:g} — must lie within [{known[0].at:g}, {known[-1].at:g}], or ask for the nearest"
+            f"{name}: {swept:g} — must lie within [{points[0].swept:g}, {points[-1].swept:g}], "
+            "or ask for the nearest"
         )
-    return _between(known, swept, at)
+    return _interpolated(points, name, swept)
 
 
-def _between(known: list[_Known], swept: str, at: float) -> CriticalValueAt:
-    above = next(index for index, point in enumerate(known) if point.at > at)
-    left, right = known[above - 1], known[above]
-    ends = [left.at, right.at]
+def _converged_points(boundary: Boundary, name: str) -> list[_ConvergedPoint]:
+    points = [
+        _ConvergedPoint(point.parameters[name], point.critical_value, low, high, point)
+        for point in boundary.points
+        if point.status == Status.CONVERGED and point.critical_value is not None
+        for low, high in [point.bracket]
+        if low is not None and high is not None
+    ]
+    return sorted(points, key=lambda point: point.swept)
+
+
+def _interpolated(points: list[_ConvergedPoint], name: str, swept: float) -> CriticalValueDocument:
+    above = next(index for index, point in enumerate(points) if point.swept > swept)
+    left, right = points[above - 1], points[above]
+    ends = [left.swept, right.swept]
     value, low, high = (
-        float(np.interp(at, ends, [getattr(left, name), getattr(right, name)]))
-        for name in ("value", "low", "high")
+        float(np.interp(swept, ends, [getattr(left, field), getattr(right, field)]))
+        for field in ("value", "low", "high")
     )
-    bend = _bend(known, above, at, value)
-    return CriticalValueAt(
-        parameters={swept: at},
+    deviation = _parabola_deviation(points, above, swept, value)
+    return CriticalValueDocument(
+        parameters={name: swept},
         critical_value=value,
-        uncertainty=(max(low - bend, 0.0), high + bend),
-        method=Method.INTERPOLATED,
+        uncertainty=(max(low - deviation, 0.0), high + deviation),
+        method=ReadingMethod.INTERPOLATED,
         points=[left.point.parameters, right.point.parameters],
     )
 
 
-def _bend(known: list[_Known], above: int, at: float, value: float) -> float:
-    """How far a parabola through the two neighbors and the next point leaves the line; the worse of two."""
-    starts = [start for start in (above - 2, above - 1) if start >= 0 and start + 3 <= len(known)]
-    triples = [known[start : start + 3] for start in starts]
+def _parabola_deviation(points: list[_ConvergedPoint], above: int, swept: float, value: float) -> float:
+    """Return how far a parabola through the two neighbors and a third point deviates from the line.
+
+    There is a third point on the left, on the right, or on both sides; then the larger deviation counts.
+    """
+    starts = [start for start in (above - 2, above - 1) if start >= 0 and start + 3 <= len(points)]
+    triples = [points[start : start + 3] for start in starts]
     parabolas = [
-        Polynomial.fit([point.at for point in triple], [point.value for point in triple], deg=2)
+        Polynomial.fit([point.swept for point in triple], [point.value for point in triple], deg=2)
         for triple in triples
     ]
-    return max((abs(float(parabola(at)) - value) for parabola in parabolas), default=0.0)
+    return max((abs(float(parabola(swept)) - value) for parabola in parabolas), default=0.0)

@@ -1,4 +1,4 @@
-"""Traced boundaries, and critical values read off them."""
+"""Traced boundaries, and critical values read from them."""
 
 from __future__ import annotations
 
@@ -8,12 +8,17 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Path, Query, Request, Response
 from pydantic import FiniteFloat, TypeAdapter, ValidationError
 
-from api.auth.callers import Reader
-from api.http.caching import ASK_AGAIN, NOT_MODIFIED, cached, etag, written
-from api.http.paging import After, Limit, Where, page
+from api.http.caching import NOT_MODIFIED, REVALIDATE, cached_response, etag, json_response
+from api.http.paging import After, CollectionPage, Limit, Where, page_response
 from api.http.problems import documented
-from api.http.schemas import BoundaryDocument, CriticalValueAt, Method, Page
-from api.results.boundary_values import critical_value_at, fitted
+from api.results.boundary_values import (
+    BoundaryDocument,
+    CriticalValueDocument,
+    ReadingMethod,
+    critical_value_at,
+    fitted_boundary,
+)
+from api.routes.service import Reader
 from ensemble.errors import BadInput
 from ensemble.store import Record
 
@@ -21,13 +26,13 @@ router = APIRouter(prefix="/boundaries", tags=["boundaries"])
 
 StudyKey = Annotated[str, Path(pattern="^[0-9a-f]{16}$", description="Key of the study.")]
 NUMBER = TypeAdapter(FiniteFloat)
-# A dotted path is no name that a function's parameter could have.
-PARAMETERS: dict[str, Any] = {
+# The name of this parameter is a dotted path, so it cannot be an argument of the function.
+SWEPT_PARAMETER: dict[str, Any] = {
     "parameters": [
         {
             "in": "query",
             "name": "parameters",
-            "description": "The swept parameter by its dotted path, such as flow.rate=0.6.",
+            "description": "The swept parameter by its dotted path, for example flow.rate=0.6.",
             "required": True,
             "style": "form",
             "explode": True,
@@ -37,7 +42,7 @@ PARAMETERS: dict[str, Any] = {
 }
 
 
-@router.get("", response_model=Page[BoundaryDocument])
+@router.get("", response_model=CollectionPage[BoundaryDocument])
 def list_boundaries(
     request: Request,
     reader: Reader,
@@ -45,33 +50,39 @@ def list_boundaries(
     after: After = None,
     limit: Limit = 100,
 ) -> Response:
-    """List the boundaries that meet all conditions, by their keys."""
-    found = reader.service.store.boundaries_page(where, after, limit + 1)
-    return page(request, [Record(key, fitted(recorded)) for key, recorded in found], limit)
+    """List the boundaries that meet all conditions, in the order of their keys."""
+    records = reader.service.store.boundaries_page(where, after, limit + 1)
+    return page_response(
+        request, [Record(key, fitted_boundary(recorded)) for key, recorded in records], limit
+    )
 
 
 @router.get(
     "/{key}", response_model=BoundaryDocument, responses=NOT_MODIFIED | documented(HTTPStatus.NOT_FOUND)
 )
 async def get_boundary(request: Request, reader: Reader, key: StudyKey) -> Response:
-    """Give a boundary as far as it is known: points, brackets, outcomes, and the line through them."""
+    """Give the present state of a boundary: points, brackets, outcomes, and the line through the points."""
     record = await reader.service.look_up(reader.service.store.boundary_record, key)
-    return cached(request, etag(record.json), ASK_AGAIN, lambda: written(fitted(record.json)))
+    return cached_response(
+        request, etag(record.json), REVALIDATE, lambda: json_response(fitted_boundary(record.json))
+    )
 
 
-@router.get("/{key}/at", openapi_extra=PARAMETERS, responses=documented(HTTPStatus.NOT_FOUND))
+@router.get("/{key}/at", openapi_extra=SWEPT_PARAMETER, responses=documented(HTTPStatus.NOT_FOUND))
 def get_critical_value(
     request: Request,
     reader: Reader,
     key: StudyKey,
     method: Annotated[
-        Method, Query(description="Between two points, or of the nearest.")
-    ] = Method.INTERPOLATED,
-) -> CriticalValueAt:
-    """Read a critical value off a boundary, with its uncertainty."""
+        ReadingMethod, Query(description="Interpolate between two points, or take the nearest point.")
+    ] = ReadingMethod.INTERPOLATED,
+) -> CriticalValueDocument:
+    """Read a critical value and its uncertainty from a boundary."""
     boundary = reader.service.store.boundary(key)
-    given = {name: text for name, text in request.query_params.multi_items() if name != "method"}
-    return critical_value_at(boundary, {name: _number(name, text) for name, text in given.items()}, method)
+    parameters = {
+        name: _number(name, text) for name, text in request.query_params.multi_items() if name != "method"
+    }
+    return critical_value_at(boundary, parameters, method)
 
 
 def _number(name: str, text: str) -> float:

@@ -1,76 +1,117 @@
-"""Jobs: submitted, watched, dismissed."""
+"""Jobs: submit, list, watch and dismiss them."""
 
 from __future__ import annotations
 
 import asyncio
+from collections.abc import AsyncIterator
 from http import HTTPStatus
 from pathlib import Path as FilePath
-from typing import Annotated
+from typing import Annotated, Any
 
-from fastapi import APIRouter, Header, Path, Query, Request, Response
+from fastapi import APIRouter, Depends, Header, Path, Query, Request, Response
 from fastapi.responses import PlainTextResponse
-from sse_starlette import EventSourceResponse
+from sse_starlette import EventSourceResponse, ServerSentEvent
 
-from api.auth.callers import Reader, Submitter
-from api.auth.scope import Scope
-from api.http.caching import written
+from api.auth import TokenScope
+from api.http.caching import json_response
 from api.http.openapi import reference
-from api.http.paging import Limit, page
+from api.http.paging import CollectionPage, Limit, page_response
 from api.http.problems import Problem, documented
-from api.http.schemas import Estimate, Page, Submission
-from api.jobs.job import Job, Kind, NoSuchJob, Status, TooManyJobs
-from api.jobs.job_events import job_events
-from api.jobs.submissions import Asked, Body
+from api.jobs.cost_estimate import Estimate
+from api.jobs.job import Job, JobStatus, Kind, NoSuchJob, TooManyJobs
+from api.jobs.submissions import Asked, Submission
+from api.routes.service import Reader, Service, Submitter
 from api.settings import Settings
 from ensemble.errors import BadInput
+from ensemble.store import Record
 
 router = APIRouter(tags=["jobs"])
 
 JobKey = Annotated[str, Path(pattern="^[0-9a-z-]{1,64}$", description="Identifier of the job.")]
-LOG_BYTES = 1 << 20
-BODY = {"requestBody": {"required": True, "content": {"application/json": {"schema": reference(Submission)}}}}
-UNSUPPORTED = documented(HTTPStatus.UNSUPPORTED_MEDIA_TYPE)
+LOG_BYTES = 1 << 20  # largest part of a log that is sent
+SUBMISSION_BODY = {
+    "requestBody": {"required": True, "content": {"application/json": {"schema": reference(Submission)}}}
+}
+UNSUPPORTED_MEDIA_TYPE = documented(HTTPStatus.UNSUPPORTED_MEDIA_TYPE)
 NO_SUCH_JOB = documented(HTTPStatus.NOT_FOUND)
+EVENT_STREAM: dict[int | str, dict[str, Any]] = {
+    HTTPStatus.OK.value: {"description": "Server-sent events.", "content": {"text/event-stream": {}}}
+}
 
 
-@router.post("/estimate", openapi_extra=BODY, responses=UNSUPPORTED)
-async def estimate_cost(reader: Reader, body: Body) -> Estimate:
-    """Say what a job may cost, without submitting it."""
+async def read_json_body(request: Request) -> bytes:
+    """Return the body of a request whose content type is JSON.
+
+    Parameters
+    ----------
+    request : Request
+
+    Returns
+    -------
+    bytes
+
+    Raises
+    ------
+    Problem
+        If the request has another content type.
+    """
+    media_type = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+    if media_type != "application/json":
+        raise Problem(
+            HTTPStatus.UNSUPPORTED_MEDIA_TYPE, f"Content-Type: {media_type!r} — must be application/json"
+        )
+    return await request.body()
+
+
+JsonBody = Annotated[bytes, Depends(read_json_body)]
+
+
+@router.post("/estimate", openapi_extra=SUBMISSION_BODY, responses=UNSUPPORTED_MEDIA_TYPE)
+async def estimate_cost(reader: Reader, body: JsonBody) -> Estimate:
+    """Give an upper bound of the cost of a job without submitting it."""
     return (await reader.service.submissions.read(body)).estimate
 
 
 @router.post(
-    "/jobs", status_code=HTTPStatus.ACCEPTED, response_model=Job, openapi_extra=BODY, responses=UNSUPPORTED
+    "/jobs",
+    status_code=HTTPStatus.ACCEPTED,
+    response_model=Job,
+    openapi_extra=SUBMISSION_BODY,
+    responses=UNSUPPORTED_MEDIA_TYPE,
 )
 async def submit_job(
     submitter: Submitter,
-    body: Body,
+    body: JsonBody,
     idempotency_key: Annotated[
         str | None,
-        Header(min_length=1, max_length=200, description="However often a request comes with it: one job."),
+        Header(
+            min_length=1,
+            max_length=200,
+            description="A key of the client's choice. Repeated requests with one key make one job.",
+        ),
     ] = None,
 ) -> Response:
-    """Accept a job; it is on disk when this is answered."""
+    """Accept a job. It is on disk when this is answered."""
     service = submitter.service
     asked = await service.submissions.read(body)
     ranks, seconds = _resources(service.settings, asked)
     offer = service.jobs.offer(
         asked.work, submitter.user, ranks, seconds, idempotency_key, service.settings.maximum_jobs
     )
-    # Not awaited itself: should the client go away, that must not cancel what shares its transaction.
+    # Awaited through `wait`: if the client disconnects, the transaction, which other jobs share, goes on.
     await asyncio.wait([asyncio.wrap_future(offer.accepted)])
     try:
         submitted = await service.look_up(service.jobs.settled, offer)
     except TooManyJobs as error:
         raise Problem(HTTPStatus.TOO_MANY_REQUESTS, str(error)) from error
-    response = written(submitted.job)
+    response = json_response(submitted.job)
     response.status_code = HTTPStatus.ACCEPTED
     response.headers["Location"] = f"/jobs/{submitted.job.id}"
     return response
 
 
 def _resources(settings: Settings, asked: Asked) -> tuple[int, float]:
-    """On how many ranks a job runs, and how long an attempt may take."""
+    """Return the number of ranks of a job and the time limit of an attempt, in seconds."""
     cost = asked.estimate
     if not cost.accepted:
         raise Problem(
@@ -89,39 +130,39 @@ def _resources(settings: Settings, asked: Asked) -> tuple[int, float]:
     return ranks, seconds
 
 
-@router.get("/jobs", response_model=Page[Job])
+@router.get("/jobs", response_model=CollectionPage[Job])
 async def list_jobs(
     request: Request,
     reader: Reader,
     owner: Annotated[str | None, Query(max_length=64)] = None,
-    status: Status | None = None,
+    status: JobStatus | None = None,
     after: Annotated[
-        str | None, Query(pattern="^[0-9a-z-]{1,64}$", description="The job before the first.")
+        str | None,
+        Query(pattern="^[0-9a-z-]{1,64}$", description="Identifier of the last job of the previous page."),
     ] = None,
     limit: Limit = 100,
 ) -> Response:
     """List the jobs, the latest first."""
+    service = reader.service
     try:
-        found = await reader.service.look_up(
-            reader.service.jobs.records.page, limit + 1, after, owner, status
-        )
+        records = await service.look_up(service.jobs.records.page, limit + 1, after, owner, status)
     except NoSuchJob:
         raise BadInput(f"after: there is no job {after}") from None
-    return page(request, found, limit)
+    return page_response(request, records, limit)
 
 
 @router.get("/jobs/{identifier}", response_model=Job, responses=NO_SUCH_JOB)
 async def get_job(reader: Reader, identifier: JobKey) -> Response:
-    """Say where a job stands."""
+    """Give a job with its status and progress."""
     record = await reader.service.look_up(reader.service.jobs.records.one, identifier)
-    return written(record.json)
+    return json_response(record.json)
 
 
 @router.delete("/jobs/{identifier}", responses=NO_SUCH_JOB)
 def dismiss_job(submitter: Submitter, identifier: JobKey) -> Job:
-    """Give a job up: no process of it is left a moment later.  A finished job stays as it is."""
+    """Dismiss a job: its processes end within seconds. A finished job stays as it is."""
     owner = submitter.service.jobs.get(identifier).owner
-    if submitter.user != owner and not submitter.scope.includes(Scope.ADMIN):
+    if submitter.user != owner and not submitter.scope.includes(TokenScope.ADMIN):
         raise Problem(HTTPStatus.FORBIDDEN, "Authorization: only its owner or an admin may dismiss a job")
     return submitter.service.jobs.dismiss(identifier)
 
@@ -129,23 +170,42 @@ def dismiss_job(submitter: Submitter, identifier: JobKey) -> Job:
 @router.get(
     "/jobs/{identifier}/events",
     response_class=EventSourceResponse,
-    responses=NO_SUCH_JOB
-    | {HTTPStatus.OK.value: {"description": "Server-sent events.", "content": {"text/event-stream": {}}}},
+    responses=NO_SUCH_JOB | EVENT_STREAM,
 )
-async def listen_to_job(reader: Reader, identifier: JobKey) -> EventSourceResponse:
-    """Send the job as it is, and again each time it changes, until it has finished."""
+async def watch_job(reader: Reader, identifier: JobKey) -> EventSourceResponse:
+    """Send the present state of the job, and the new one after each change, until the job has finished."""
     record = await reader.service.look_up(reader.service.jobs.records.one, identifier)
-    return EventSourceResponse(job_events(reader.service, record))
+    return EventSourceResponse(_events(reader.service, record))
+
+
+async def _events(service: Service, record: Record) -> AsyncIterator[ServerSentEvent]:
+    yield ServerSentEvent(event="job", data=record.json)
+    while not Job.model_validate_json(record.json).status.finished:
+        latest = record
+        while latest == record:
+            await asyncio.sleep(service.settings.event_seconds)
+            latest = await _watched_job(service, record.key)
+        record = latest
+        yield ServerSentEvent(event="job", data=record.json)
+
+
+async def _watched_job(service: Service, identifier: str) -> Record:
+    """Return a job as it was a moment ago; all clients that watch one job share the reading."""
+    record = service.watched_jobs.get(identifier)
+    if record is None:
+        record = await service.look_up(service.jobs.records.one, identifier)
+        service.watched_jobs[identifier] = record
+    return record
 
 
 @router.get("/jobs/{identifier}/log", response_class=PlainTextResponse, responses=NO_SUCH_JOB)
 def get_log(reader: Reader, identifier: JobKey) -> Response:
-    """Give what the job's processes have said so far; of a long log the end."""
+    """Give the log of the job's processes; of a long log only the end."""
     jobs = reader.service.jobs
-    return PlainTextResponse(_tail(jobs.log_path(jobs.get(identifier))))
+    return PlainTextResponse(_end_of_log(jobs.log_path(jobs.get(identifier))))
 
 
-def _tail(path: FilePath) -> bytes:
+def _end_of_log(path: FilePath) -> bytes:
     if not path.exists():
         return b""
     with path.open("rb") as log:

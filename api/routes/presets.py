@@ -5,10 +5,11 @@ from __future__ import annotations
 from fastapi import APIRouter
 from pydantic import TypeAdapter
 
-from api.auth.callers import Reader
-from api.http.schemas import Page, Preset
+from api.http.paging import CollectionPage
 from api.jobs.cost_estimate import estimate
 from api.jobs.job import preset_work
+from api.jobs.submissions import PresetDocument
+from api.routes.service import Reader
 from ensemble.config.documents import preset_document, preset_names
 from solver.scene.arrangement import Arrangement
 
@@ -16,21 +17,22 @@ router = APIRouter(prefix="/presets", tags=["presets"])
 
 
 @router.get("")
-def list_presets(reader: Reader) -> Page[Preset]:
-    """List the presets, in full and with what they may cost."""
-    return Page(
-        items=[_preset(name, reader.service.settings.maximum_cost) for name in preset_names()], next=None
-    )
+def list_presets(reader: Reader) -> CollectionPage[PresetDocument]:
+    """List the presets, with all fields and with the largest cost of each."""
+    maximum_cost = reader.service.settings.maximum_cost
+    return CollectionPage(items=[_preset(name, maximum_cost) for name in preset_names()], next=None)
 
 
-def _preset(name: str, maximum_cost: float) -> Preset:
+def _preset(name: str, maximum_cost: float) -> PresetDocument:
     work = preset_work(name, {})
     document = work.document
     arrangement = preset_document(name).get("arrangement")
-    if arrangement is not None:  # a few lines that one may change, instead of the vesicles that come of them
-        in_full = TypeAdapter(Arrangement).dump_python(
+    if arrangement is not None:  # its few fields are easier to change than the vesicles made from it
+        complete = TypeAdapter(Arrangement).dump_python(
             TypeAdapter(Arrangement).validate_python(arrangement), mode="json", exclude_none=True
         )
         document = {key: value for key, value in document.items() if key != "vesicles"}
-        document["arrangement"] = in_full
-    return Preset(name=name, kind=work.kind, document=document, estimate=estimate(work.model, maximum_cost))
+        document["arrangement"] = complete
+    return PresetDocument(
+        name=name, kind=work.kind, document=document, estimate=estimate(work.model, maximum_cost)
+    )

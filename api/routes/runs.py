@@ -7,34 +7,39 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Request, Response
 
-from api.auth.callers import Reader
-from api.http.caching import FOR_EVER, NOT_MODIFIED, cached, etag, written
-from api.http.paging import After, Limit, Where, page
+from api.http.caching import IMMUTABLE, NOT_MODIFIED, cached_response, etag, json_response
+from api.http.paging import After, CollectionPage, Limit, Where, page_response
 from api.http.problems import documented
-from api.http.schemas import FramesDocument, Page, SeriesDocument
-from api.results.frames import frames_bytes, frames_document, select_frames
-from api.results.series import series_document
+from api.results.run_arrays import (
+    FramesDocument,
+    SeriesDocument,
+    frames_bytes,
+    frames_document,
+    select_frames,
+    series_document,
+)
+from api.routes.service import Reader
 from ensemble.store.run_record import RunSummary
 
-OCTETS = "application/octet-stream"
-MOST_FRAMES = 1_000_000_000
+BINARY = "application/octet-stream"
+MAXIMUM_FRAME = 1_000_000_000
 
 router = APIRouter(prefix="/runs", tags=["runs"])
 
 RunKey = Annotated[str, Path(pattern="^[0-9a-f]{32}$", description="Key of the run.")]
-OF_A_RUN: dict[int | str, dict[str, Any]] = NOT_MODIFIED | documented(HTTPStatus.NOT_FOUND)
-FRAMES: dict[int | str, dict[str, Any]] = {
+RUN_RESPONSES: dict[int | str, dict[str, Any]] = NOT_MODIFIED | documented(HTTPStatus.NOT_FOUND)
+FRAMES_RESPONSE: dict[int | str, dict[str, Any]] = {
     HTTPStatus.OK.value: {
         "description": (
             "JSON or, by the header Accept, little-endian float32: for each frame its time, then for each "
-            "vesicle x of all points, y of all points and the tensions there."
+            "vesicle x of all points, y of all points and the tensions at these points."
         ),
-        "content": {OCTETS: {"schema": {"type": "string", "format": "binary"}}},
+        "content": {BINARY: {"schema": {"type": "string", "format": "binary"}}},
     }
 }
 
 
-@router.get("", response_model=Page[RunSummary])
+@router.get("", response_model=CollectionPage[RunSummary])
 def list_runs(
     request: Request,
     reader: Reader,
@@ -42,49 +47,54 @@ def list_runs(
     after: After = None,
     limit: Limit = 100,
 ) -> Response:
-    """List the runs that meet all conditions, newest first."""
-    return page(request, reader.service.store.runs_page(where, after, limit + 1), limit)
+    """List the runs that meet all conditions, the newest first."""
+    return page_response(request, reader.service.store.runs_page(where, after, limit + 1), limit)
 
 
-@router.get("/{key}", response_model=RunSummary, responses=OF_A_RUN)
+@router.get("/{key}", response_model=RunSummary, responses=RUN_RESPONSES)
 async def get_run(request: Request, reader: Reader, key: RunKey) -> Response:
     """Give everything about a run except its arrays."""
     record = await reader.service.look_up(reader.service.store.run_record, key)
-    return cached(request, etag(key), FOR_EVER, lambda: written(record.json))
+    return cached_response(request, etag(key), IMMUTABLE, lambda: json_response(record.json))
 
 
-@router.get("/{key}/series", response_model=SeriesDocument, responses=OF_A_RUN)
+@router.get("/{key}/series", response_model=SeriesDocument, responses=RUN_RESPONSES)
 def get_series(
     request: Request,
     reader: Reader,
     key: RunKey,
-    name: Annotated[list[str], Query(max_length=50, description="Diagnostics; all if left out.")] = [],  # noqa: B006
+    name: Annotated[
+        list[str], Query(max_length=50, description="Names of diagnostics; without any, all are given.")
+    ] = [],  # noqa: B006
 ) -> Response:
     """Give the diagnostics of a run over time."""
 
     def make() -> Response:
-        return written(series_document(reader.service.store.load(key), name))
+        return json_response(series_document(reader.service.store.load(key), name))
 
-    return cached(request, etag(key, "series", *sorted(name)), FOR_EVER, make)
+    return cached_response(request, etag(key, "series", *sorted(name)), IMMUTABLE, make)
 
 
-@router.get("/{key}/frames", response_model=FramesDocument, responses=OF_A_RUN | FRAMES)
+@router.get("/{key}/frames", response_model=FramesDocument, responses=RUN_RESPONSES | FRAMES_RESPONSE)
 def get_frames(
     request: Request,
     reader: Reader,
     key: RunKey,
-    start: Annotated[int, Query(ge=0, le=MOST_FRAMES, description="First frame.")] = 0,
-    stop: Annotated[int, Query(ge=0, le=MOST_FRAMES, description="The frame after the last.")] = MOST_FRAMES,
-    stride: Annotated[int, Query(ge=1, le=MOST_FRAMES, description="Give every so many-th frame.")] = 1,
+    start: Annotated[int, Query(ge=0, le=MAXIMUM_FRAME, description="Number of the first frame.")] = 0,
+    stop: Annotated[
+        int, Query(ge=0, le=MAXIMUM_FRAME, description="Number of the frame after the last.")
+    ] = MAXIMUM_FRAME,
+    stride: Annotated[int, Query(ge=1, le=MAXIMUM_FRAME, description="Step from frame to frame.")] = 1,
 ) -> Response:
     """Give the recorded states of a run."""
-    octets = OCTETS in request.headers.get("accept", "")
+    is_binary = BINARY in request.headers.get("accept", "")
 
     def make() -> Response:
         run = reader.service.store.load(key)
-        states = select_frames(run, start, stop, stride, reader.service.settings.frame_values)
-        if octets:
-            return Response(frames_bytes(states), media_type=OCTETS)
-        return written(frames_document(states))
+        states = select_frames(run, range(start, stop, stride), reader.service.settings.frame_values)
+        if is_binary:
+            return Response(frames_bytes(states), media_type=BINARY)
+        return json_response(frames_document(states))
 
-    return cached(request, etag(key, "frames", f"{start}:{stop}:{stride}:{octets}"), FOR_EVER, make)
+    tag = etag(key, "frames", f"{start}:{stop}:{stride}:{is_binary}")
+    return cached_response(request, tag, IMMUTABLE, make)

@@ -15,10 +15,13 @@ const CONFIGURATION = {
   toImageButtonOptions: { format: "svg" },
 };
 
-/** @returns {Promise<any>} */
+/**
+ * Plotly with scatter plots only; `api/README.md` says how this file is built.
+ *
+ * @returns {Promise<any>}
+ */
 async function loadPlotly() {
-  await import("./plotly/plotly.min.js"); // an older kind of script: it leaves one global behind
-  return /** @type {any} */ (globalThis).Plotly;
+  return (await import("./vendor/plotly.js")).default;
 }
 
 /** A place on the page where figures are drawn, one replacing the other. */

@@ -13,10 +13,10 @@ from typing import Any
 
 import tomli_w
 
-from api.jobs.job import Kind, Lease, Status
+from api.jobs.job import JobStatus, Kind, Lease
 from api.jobs.job_queue import Jobs
+from api.jobs.worker_name import own_name
 from api.worker.mpirun import Process, mpirun_command
-from api.worker.worker_name import own_name
 
 POLL_SECONDS = 0.5
 HEARTBEAT_SECONDS = 0.5
@@ -33,7 +33,7 @@ log = logging.getLogger(__name__)
 class JobResult:
     """How a job has ended."""
 
-    status: Status
+    status: JobStatus
     message: str
 
 
@@ -64,7 +64,7 @@ class Worker:
     def _carry_out(self, lease: Lease, stop: threading.Event) -> None:
         job = lease.job
         if job.attempts > MAXIMUM_ATTEMPTS:
-            self._end(lease, JobResult(Status.FAILED, f"given up: cut short {MAXIMUM_ATTEMPTS} times"))
+            self._end(lease, JobResult(JobStatus.FAILED, f"given up: cut short {MAXIMUM_ATTEMPTS} times"))
             return
         log.info("job %s: attempt %d", job.id, job.attempts)
         deadline = time.monotonic() + job.seconds
@@ -77,7 +77,7 @@ class Worker:
                 if time.monotonic() > deadline:
                     process.end()
                     self._end(
-                        lease, JobResult(Status.FAILED, f"stopped at its time limit, {job.seconds:g} s")
+                        lease, JobResult(JobStatus.FAILED, f"stopped at its time limit, {job.seconds:g} s")
                     )
                     return
                 progress = process.progress
@@ -121,9 +121,9 @@ def job_result(kind: Kind, status: int, output: str, last_words: str) -> JobResu
     try:
         document = json.loads(output)
     except json.JSONDecodeError:
-        return JobResult(Status.FAILED, last_words or f"ended with status {status}")
+        return JobResult(JobStatus.FAILED, last_words or f"ended with status {status}")
     message = _study_message(document) if kind is Kind.STUDY else document["failure"] or document["outcome"]
-    return JobResult(Status.SUCCEEDED if status == 0 else Status.FAILED, message)
+    return JobResult(JobStatus.SUCCEEDED if status == 0 else JobStatus.FAILED, message)
 
 
 def _study_message(document: Mapping[str, Any]) -> str:

@@ -8,7 +8,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from api.auth.scope import Scope
+from api.auth import TokenScope
 from ensemble.store import Store
 from tests.api.servers import make_token, serving
 from tests.api.stores import fill
@@ -57,7 +57,7 @@ def try_everything(directory: Path, *options: str, seconds: float) -> RequestVer
     (directory / "schemathesis.toml").write_text(
         CONFIGURATION.format(run=run.key, boundary=boundary.study_key), encoding="utf-8"
     )
-    token = make_token(store, "ada", Scope.SUBMIT)
+    token = make_token(store, "ada", TokenScope.SUBMIT)
     command = [str(Path(sys.executable).with_name("schemathesis")), "run", "--checks=all", "--no-color"]
     # To delete a job is to dismiss it: it stays, as one that has been dismissed.
     command += ["--exclude-checks=use_after_free"]

@@ -14,16 +14,16 @@ import httpx
 import uvicorn
 
 from api.app import create_app
-from api.auth.scope import Scope
+from api.auth import TokenScope
 from api.auth.tokens import Tokens
 from api.database.service_database import Database
-from api.serve import configuration, opened
+from api.serve import open_service, server_configuration
 from api.settings import Settings
 
 SECONDS_TO_START = 20
 
 
-def make_token(store: Path, user: str, scope: Scope, lifetime: timedelta = timedelta(hours=1)) -> str:
+def make_token(store: Path, user: str, scope: TokenScope, lifetime: timedelta = timedelta(hours=1)) -> str:
     """Make a token in the database of a store."""
     with Database.open(Settings(store=store).database_url, store) as database:
         return Tokens(database).create(user, scope, lifetime)
@@ -33,8 +33,8 @@ def make_token(store: Path, user: str, scope: Scope, lifetime: timedelta = timed
 def serving(store: Path, **limits: Any) -> Iterator[str]:
     """Serve a store, without workers; gives the address."""
     settings = Settings(store=store, **limits)
-    with opened(settings) as service:
-        server = uvicorn.Server(configuration(create_app(service), settings, "127.0.0.1", 0))
+    with open_service(settings) as service:
+        server = uvicorn.Server(server_configuration(create_app(service), settings, "127.0.0.1", 0))
         thread = threading.Thread(target=server.run)
         thread.start()
         try:

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from api.auth.scope import Scope
+from api.auth import TokenScope
 from api.client import Client, Refused
-from api.jobs.job import Job, Status
+from api.jobs.job import Job, JobStatus
 from ensemble.config.documents import load_scene, load_study
 from ensemble.store import Store
 from solver.analysis.run import Outcome
@@ -48,7 +48,7 @@ def test_a_submitted_scene_is_waited_for_and_read(tmp_path: Path) -> None:
         job = client.wait(client.submit("doublet-shear", SHORT), seen.append)
         run = client.run(job.key)
         data = run.to_xarray()
-    assert job.status is Status.SUCCEEDED
+    assert job.status is JobStatus.SUCCEEDED
     assert seen[-1] == job
     assert [event.progress for event in seen] == sorted(event.progress for event in seen)
     with Store.existing(store) as opened:
@@ -120,14 +120,14 @@ def test_a_dismissed_job_is_waited_for_no_longer(submitter: Client) -> None:
     job = submitter.submit("doublet-shear")
     timer = threading.Timer(0.3, lambda: submitter.dismiss(job))
     timer.start()
-    assert submitter.wait(job).status is Status.DISMISSED
+    assert submitter.wait(job).status is JobStatus.DISMISSED
     timer.join()
 
 
 def test_a_token_opens_a_service_that_asks_for_one(tmp_path: Path) -> None:
     store = tmp_path / "store"
     Store.open(store).close()
-    token = make_token(store, "ada", Scope.SUBMIT, timedelta(hours=1))
+    token = make_token(store, "ada", TokenScope.SUBMIT, timedelta(hours=1))
     with serving(store) as url:
         with Client(url) as client, pytest.raises(Refused) as refusal:
             client.submit("vesicle-shear")
@@ -196,4 +196,4 @@ def test_waiting_goes_on_when_the_service_is_killed_and_started_anew(tmp_path: P
         first.process.wait()
         with service(store, tmp_path / "second.log", port=first.port):
             waiting.join(timeout=60)
-    assert [job.status for job in finished] == [Status.SUCCEEDED]
+    assert [job.status for job in finished] == [JobStatus.SUCCEEDED]

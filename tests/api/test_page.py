@@ -13,7 +13,7 @@ import httpx
 import pytest
 from playwright.sync_api import Browser, ConsoleMessage, Page, expect, sync_playwright
 
-from api.auth.scope import Scope
+from api.auth import TokenScope
 from ensemble.config.documents import load_study
 from ensemble.config.run_key import run_key
 from ensemble.search.boundary import Boundary
@@ -302,7 +302,7 @@ def test_runs_are_filtered(page: Page, url: str, store: Path) -> None:
 
 def test_a_token_is_asked_for_where_one_is_needed(page: Page, store: Path, tmp_path: Path) -> None:
     guarded = Path(shutil.copytree(store, tmp_path / "store"))
-    token = make_token(guarded, "ada", Scope.READ, timedelta(hours=1))
+    token = make_token(guarded, "ada", TokenScope.READ, timedelta(hours=1))
     with serving(guarded) as url:
         page.goto(url)
         expect(page.get_by_role("dialog")).to_contain_text("asks for a token")

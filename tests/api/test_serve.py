@@ -18,7 +18,7 @@ import httpx
 import psutil
 import pytest
 
-from api.auth.scope import Scope
+from api.auth import TokenScope
 from tests.api.servers import make_token
 
 SERVE = (sys.executable, "-m", "ensemble", "serve")
@@ -171,7 +171,7 @@ def test_another_address_needs_tokens(store):
     message = refused(store, "--host=0.0.0.0")
     assert "0.0.0.0" in message
     assert "ensemble token create" in message
-    token = make_token(store, "ada", Scope.READ)
+    token = make_token(store, "ada", TokenScope.READ)
     with served(store, "--host=0.0.0.0", "--workers=0") as server:
         assert "There are no tokens" not in server.said.read_text(encoding="utf-8")
         port = server.client.base_url.port

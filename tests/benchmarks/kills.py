@@ -29,7 +29,7 @@ import httpx
 import psutil
 
 from api.database.service_database import Database
-from api.jobs.job import Job, Status
+from api.jobs.job import Job, JobStatus
 from api.jobs.job_queue import Jobs
 from api.settings import Settings
 from ensemble.store import Store
@@ -122,7 +122,7 @@ class Load:
     def _submit(self) -> None:
         number = 0
         while not self._stop.is_set():
-            if self._jobs.counts()[Status.ACCEPTED] >= AHEAD:
+            if self._jobs.counts()[JobStatus.ACCEPTED] >= AHEAD:
                 time.sleep(0.05)
                 continue
             number += 1
@@ -181,8 +181,8 @@ def kill_once(service: Service, jobs: Jobs, victim: str, chance: random.Random) 
         wait_for(lambda: _finished(jobs) > finished)
     wait_for(lambda: service.find("mpirun"))
     time.sleep(chance.uniform(0, 3.0))
-    wait_for(lambda: jobs.latest(1, status=Status.RUNNING) and service.find(victim))
-    (job,) = jobs.latest(1, status=Status.RUNNING) or [None]
+    wait_for(lambda: jobs.latest(1, status=JobStatus.RUNNING) and service.find(victim))
+    (job,) = jobs.latest(1, status=JobStatus.RUNNING) or [None]
     spared = {"server"} if victim in ("server", "worker") else {"server", "worker"}
     old = [process for process in service.members() if not any(_plays(process, part) for part in spared)]
     found = service.find(victim)
@@ -253,7 +253,7 @@ def main() -> None:
         "reads": load.reads,
         "lost": len(set(load.acknowledged) - kept.keys()),
         "not succeeded": [
-            kept[name].message for name in load.acknowledged if kept[name].status != Status.SUCCEEDED
+            kept[name].message for name in load.acknowledged if kept[name].status != JobStatus.SUCCEEDED
         ],
         "jobs beyond those acknowledged": len(kept.keys() - set(load.acknowledged)),
         "keys with two jobs": len(kept) - len({job.key for job in kept.values()}),

@@ -30,7 +30,7 @@ from sqlalchemy import insert
 
 from api.database.database_tables import JobRow
 from api.database.service_database import Database
-from api.jobs.job import Status, preset_work
+from api.jobs.job import JobStatus, preset_work
 from api.jobs.job_queue import Jobs
 from api.settings import Settings
 from ensemble.store import Store
@@ -65,7 +65,7 @@ def fill_queue(store: Path, count: int) -> list[str]:
             "document": {},
             "fingerprint": "",
             "idempotency_key": None,
-            "status": Status.SUCCEEDED,
+            "status": JobStatus.SUCCEEDED,
         }
         identifiers = [f"{number:032x}" for number in range(count)]
         for start in range(0, count, BATCH):

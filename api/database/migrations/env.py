@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from alembic import context
 
-from api.database.database_tables import Table
+from api.database.database_tables import ServiceTable
 
 # SQLite changes a table by copying it; elsewhere the same steps are plain ALTER statements.
 context.configure(
     connection=context.config.attributes["connection"],
-    target_metadata=Table.metadata,
+    target_metadata=ServiceTable.metadata,
     render_as_batch=True,
 )
 with context.begin_transaction():

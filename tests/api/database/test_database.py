@@ -13,7 +13,7 @@ from alembic import command
 from alembic.config import Config
 from sqlalchemy import delete, inspect, text
 
-from api.database.database_tables import JobRow, Table
+from api.database.database_tables import JobRow, ServiceTable
 from api.database.service_database import MIGRATIONS, Database
 from api.jobs.job import preset_work
 from api.jobs.job_queue import Jobs
@@ -58,7 +58,7 @@ def test_every_migration_can_be_taken_back(database):
     with database.begin() as connection:
         command.downgrade(migrations(connection), "base")
         left = set(inspect(connection).get_table_names())
-        assert not left & set(Table.metadata.tables)
+        assert not left & set(ServiceTable.metadata.tables)
         command.upgrade(migrations(connection), "head")
         command.check(migrations(connection))
 

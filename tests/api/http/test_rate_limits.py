@@ -10,8 +10,8 @@ from collections.abc import Iterator
 import httpx
 import pytest
 
-from api.auth.scope import Scope
-from api.http.headers import SAFE_HEADERS
+from api.auth import TokenScope
+from api.http.middleware import SECURITY_HEADERS
 from tests.api.servers import client_of, make_token
 
 JSON = {"Content-Type": "application/json"}
@@ -303,7 +303,7 @@ def test_many_idle_connections_do_not_keep_others_out(store):
 
 
 def test_requests_are_counted_for_each_user(store):
-    ada, bob = (make_token(store, user, Scope.READ) for user in ("ada", "bob"))
+    ada, bob = (make_token(store, user, TokenScope.READ) for user in ("ada", "bob"))
     with client_of(store, request_rate="5/minute") as client:
 
         def ask(token: str) -> httpx.Response:
@@ -319,7 +319,7 @@ def test_requests_are_counted_for_each_user(store):
 @pytest.mark.parametrize("path", ["/jobs", "/nowhere", "/healthz", "/jobs/UPPER"])
 def test_every_answer_has_the_safe_headers_and_no_other_site_may_read_it(reading, path):
     response = reading.get(path, headers={"Origin": "https://evil.example"})
-    for name, value in SAFE_HEADERS.items():
+    for name, value in SECURITY_HEADERS.items():
         assert response.headers[name] == value
     assert not [name for name in response.headers if name.startswith("access-control")]
     assert "server" not in response.headers

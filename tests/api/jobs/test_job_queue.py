@@ -19,10 +19,10 @@ from api.database.service_database import Database
 from api.jobs.job import (
     IdempotencyConflict,
     Job,
+    JobStatus,
     Kind,
     Lease,
     NoSuchJob,
-    Status,
     TooManyJobs,
     Work,
     preset_work,
@@ -30,7 +30,7 @@ from api.jobs.job import (
     study_work,
 )
 from api.jobs.job_queue import LEASE_SECONDS, Jobs
-from api.worker.worker_name import own_name
+from api.jobs.worker_name import own_name
 from ensemble.config.documents import load_scene, load_study
 from ensemble.config.run_key import run_key
 from tests.api.accepting import accepted
@@ -126,7 +126,7 @@ def test_an_accepted_job_is_what_was_asked_for(jobs, clock):
     assert jobs.document(job) == SCENE.document
     assert (job.owner, job.kind, job.name, job.key) == ("ada", Kind.SCENE, "doublet-shear", SCENE.key)
     assert (job.ranks, job.seconds, job.attempts, job.progress) == (2, SECONDS, 0, 0)
-    assert job.status is Status.ACCEPTED
+    assert job.status is JobStatus.ACCEPTED
     assert job.created == job.updated == clock.present
     assert job.started is None
     assert job.finished is None
@@ -150,7 +150,7 @@ def test_a_key_belongs_to_one_request_of_one_owner(jobs):
     jobs.dismiss(first.job.id)
     again = accepted(jobs, SCENE, "ada", 1, SECONDS, "key")
     assert not again.new
-    assert again.job.status is Status.DISMISSED
+    assert again.job.status is JobStatus.DISMISSED
 
 
 def test_an_owner_may_have_so_many_unfinished_jobs(jobs):
@@ -177,7 +177,7 @@ def test_records_are_the_jobs_as_they_are_sent(jobs):
     assert jobs.records.one(waiting.id).json == waiting.model_dump_json()
     lease = leased(jobs)
     assert jobs.records.one(waiting.id).json == lease.job.model_dump_json()
-    assert jobs.finish(lease, Status.SUCCEEDED, "both “done” and more")
+    assert jobs.finish(lease, JobStatus.SUCCEEDED, "both “done” and more")
     done = jobs.get(waiting.id)
     assert done.started is not None
     assert done.finished is not None
@@ -200,9 +200,9 @@ def test_lists_by_owner_and_status(jobs):
         submit(jobs, owner)
     running = leased(jobs).job
     assert [job.owner for job in jobs.latest(10, owner="ada")] == ["ada", "ada"]
-    assert [job.id for job in jobs.latest(10, status=Status.RUNNING)] == [running.id]
-    assert jobs.latest(10, owner="bob", status=Status.RUNNING) == []
-    assert jobs.counts() == dict.fromkeys(Status, 0) | {Status.ACCEPTED: 2, Status.RUNNING: 1}
+    assert [job.id for job in jobs.latest(10, status=JobStatus.RUNNING)] == [running.id]
+    assert jobs.latest(10, owner="bob", status=JobStatus.RUNNING) == []
+    assert jobs.counts() == dict.fromkeys(JobStatus, 0) | {JobStatus.ACCEPTED: 2, JobStatus.RUNNING: 1}
 
 
 def test_what_is_not_there_is_said_so(jobs):
@@ -241,7 +241,7 @@ def test_workers_that_ask_at_once_get_different_jobs(jobs):
 
     def take(worker: int) -> Iterator[str]:
         # None may only mean that another worker was faster.
-        while jobs.counts()[Status.ACCEPTED]:
+        while jobs.counts()[JobStatus.ACCEPTED]:
             if (lease := jobs.lease(str(worker))) is not None:
                 yield lease.job.id
 
@@ -257,7 +257,7 @@ def test_a_leased_job_runs(jobs, clock):
     assert lease.document == SCENE.document
     job = jobs.get(lease.job.id)
     assert job == lease.job
-    assert (job.status, job.attempts, job.started) == (Status.RUNNING, 1, job.updated)
+    assert (job.status, job.attempts, job.started) == (JobStatus.RUNNING, 1, job.updated)
 
 
 def test_progress_never_falls(jobs):
@@ -270,7 +270,7 @@ def test_progress_never_falls(jobs):
     assert seen == [(10, "at 10"), (40, "at 40"), (40, "at 30")]
 
 
-@pytest.mark.parametrize("status", [Status.SUCCEEDED, Status.FAILED])
+@pytest.mark.parametrize("status", [JobStatus.SUCCEEDED, JobStatus.FAILED])
 def test_a_finished_job_stays_so(jobs, status):
     submit(jobs)
     lease = leased(jobs)
@@ -278,8 +278,8 @@ def test_a_finished_job_stays_so(jobs, status):
     assert jobs.finish(lease, status, "the end")
     job = jobs.get(lease.job.id)
     assert (job.status, job.message, job.finished) == (status, "the end", job.updated)
-    assert job.progress == (100 if status is Status.SUCCEEDED else 40)
-    assert not jobs.finish(lease, Status.FAILED, "again")
+    assert job.progress == (100 if status is JobStatus.SUCCEEDED else 40)
+    assert not jobs.finish(lease, JobStatus.FAILED, "again")
     assert not jobs.heartbeat(lease, 50, "again")
     assert not jobs.give_back(lease, "again")
     assert jobs.dismiss(job.id) == job
@@ -308,9 +308,9 @@ def test_the_job_of_a_lost_worker_goes_to_another_one_and_the_lost_one_can_chang
     before = jobs.get(first.id)
     assert not jobs.heartbeat(lost, 99, "too late")
     assert not jobs.give_back(lost, "too late")
-    assert not jobs.finish(lost, Status.FAILED, "too late")
+    assert not jobs.finish(lost, JobStatus.FAILED, "too late")
     assert jobs.get(first.id) == before
-    assert jobs.finish(found, Status.SUCCEEDED, "done")
+    assert jobs.finish(found, JobStatus.SUCCEEDED, "done")
     assert leased(jobs).job.id == second.id
 
 
@@ -319,8 +319,8 @@ def test_what_is_given_back_is_leased_again(jobs):
     lease = leased(jobs)
     assert jobs.give_back(lease, "stopped")
     job = jobs.get(lease.job.id)
-    assert (job.status, job.message) == (Status.ACCEPTED, "stopped")
-    assert not jobs.finish(lease, Status.SUCCEEDED, "too late")
+    assert (job.status, job.message) == (JobStatus.ACCEPTED, "stopped")
+    assert not jobs.finish(lease, JobStatus.SUCCEEDED, "too late")
     assert leased(jobs).job.attempts == 2
 
 
@@ -328,16 +328,16 @@ def test_a_dismissed_job_is_taken_from_its_worker(jobs):
     job = submit(jobs)
     lease = leased(jobs)
     dismissed = jobs.dismiss(job.id)
-    assert (dismissed.status, dismissed.finished) == (Status.DISMISSED, dismissed.updated)
+    assert (dismissed.status, dismissed.finished) == (JobStatus.DISMISSED, dismissed.updated)
     assert not jobs.heartbeat(lease, 50, "still here")
-    assert not jobs.finish(lease, Status.SUCCEEDED, "done")
+    assert not jobs.finish(lease, JobStatus.SUCCEEDED, "done")
     assert jobs.get(job.id) == dismissed
     assert jobs.lease("another") is None
 
 
 def test_a_waiting_job_can_be_dismissed(jobs):
     job = submit(jobs)
-    assert jobs.dismiss(job.id).status is Status.DISMISSED
+    assert jobs.dismiss(job.id).status is JobStatus.DISMISSED
     assert jobs.lease("worker") is None
 
 
@@ -365,7 +365,7 @@ class Queue(RuleBasedStateMachine):
 
     @rule()
     def lease(self) -> None:
-        waiting = self.jobs.counts()[Status.ACCEPTED]
+        waiting = self.jobs.counts()[JobStatus.ACCEPTED]
         lease = self.jobs.lease("worker")
         assert lease is not None or not waiting
         if lease is not None:
@@ -376,13 +376,13 @@ class Queue(RuleBasedStateMachine):
     def use_a_lease(self, data: st.DataObject, action: str) -> None:
         lease = data.draw(st.sampled_from(self.leases))
         before = self.jobs.get(lease.job.id)
-        valid = before.status is Status.RUNNING and before.attempts == lease.job.attempts
+        valid = before.status is JobStatus.RUNNING and before.attempts == lease.job.attempts
         if action == "heartbeat":
             assert self.jobs.heartbeat(lease, 50, "half") == valid
         elif action == "give_back":
             assert self.jobs.give_back(lease, "back") == valid
         elif action == "finish":
-            assert self.jobs.finish(lease, Status.SUCCEEDED, "done") == valid
+            assert self.jobs.finish(lease, JobStatus.SUCCEEDED, "done") == valid
             self.finished[lease.job.id] += valid
         else:
             was_unfinished = not before.status.finished

@@ -13,9 +13,9 @@ from typing import Any
 import httpx
 import pytest
 
-from api.auth.scope import Scope
+from api.auth import TokenScope
 from api.database.service_database import Database
-from api.jobs.job import Status
+from api.jobs.job import JobStatus
 from api.jobs.job_queue import Jobs
 from api.settings import Settings
 from ensemble.config.documents import load_scene, load_study, preset_names
@@ -177,7 +177,7 @@ def test_a_listener_hears_of_every_change_until_the_end(submitting, queue):
         assert queue.heartbeat(lease, 40, "four of ten")
         middle = next(heard)[1]
         assert (middle["progress"], middle["message"]) == (40, "four of ten")
-        assert queue.finish(lease, Status.SUCCEEDED, "done")
+        assert queue.finish(lease, JobStatus.SUCCEEDED, "done")
         last = next(heard)[1]
         assert (last["status"], last["message"]) == ("succeeded", "done")
         assert list(heard) == []
@@ -222,7 +222,12 @@ def test_only_its_owner_or_an_admin_dismisses_a_job(store):
             assert bob.delete(f"/jobs/{mine['id']}").json()["status"] == "dismissed"
 
 
-OWNERS = {"ada": Scope.SUBMIT, "bob": Scope.SUBMIT, "eve": Scope.READ, "root": Scope.ADMIN}
+OWNERS = {
+    "ada": TokenScope.SUBMIT,
+    "bob": TokenScope.SUBMIT,
+    "eve": TokenScope.READ,
+    "root": TokenScope.ADMIN,
+}
 
 
 def test_presets_are_given_in_full_and_with_their_cost(submitting):

@@ -13,7 +13,7 @@ import psutil
 import pytest
 
 from api.database.service_database import Database
-from api.jobs.job import Job, Kind, Status, Work, preset_work
+from api.jobs.job import Job, JobStatus, Kind, Work, preset_work
 from api.jobs.job_queue import Jobs
 from api.settings import Settings
 from api.worker.background import NICENESS
@@ -87,14 +87,14 @@ def test_jobs_are_carried_out_one_after_the_other(jobs, store):
         wait_until(all_finished)
     with Store.existing(store) as opened:
         scene_done, study_done = jobs.get(scene.id), jobs.get(study.id)
-        assert (scene_done.status, scene_done.message) == (Status.SUCCEEDED, "bound")
+        assert (scene_done.status, scene_done.message) == (JobStatus.SUCCEEDED, "bound")
         assert opened.outcome(scene.key) == "bound"
-        assert (study_done.status, study_done.message) == (Status.SUCCEEDED, "2 of 2 points converged")
+        assert (study_done.status, study_done.message) == (JobStatus.SUCCEEDED, "2 of 2 points converged")
         (boundary,) = [found for found in opened.boundaries() if found.study_key == study.key]
         assert {point.status for point in boundary.points} == {"converged"}
-        assert jobs.get(failing.id).status is Status.FAILED
+        assert jobs.get(failing.id).status is JobStatus.FAILED
         assert jobs.get(failing.id).message == opened.summary(failing.key).failure
-        assert jobs.get(unbracketed.id).status is Status.FAILED
+        assert jobs.get(unbracketed.id).status is JobStatus.FAILED
         assert jobs.get(unbracketed.id).message == "0 of 1 points converged; flow.rate 0.5: unbracketed"
         assert opened.check() == []
     for done in (scene_done, study_done):
@@ -113,7 +113,7 @@ def test_what_is_in_the_store_is_not_run_again(jobs, store):
         before = made(store)
         again = submit(jobs, QUICK_SCENE)
         wait_until(finished(jobs, again))
-    assert jobs.get(again.id).status is Status.SUCCEEDED
+    assert jobs.get(again.id).status is JobStatus.SUCCEEDED
     assert made(store) == before
     assert before.keys() == {first.key}
 
@@ -123,7 +123,7 @@ def test_a_job_ends_at_its_time_limit(jobs, store):
     with working(store) as family:
         wait_until(finished(jobs, job))
         wait_until(lambda: not family.descendants(), SECONDS_TO_DISMISS)
-    assert jobs.get(job.id).status is Status.FAILED
+    assert jobs.get(job.id).status is JobStatus.FAILED
     assert jobs.get(job.id).message == "stopped at its time limit, 1 s"
 
 
@@ -139,10 +139,10 @@ def test_a_dismissed_job_leaves_no_process_and_makes_room(jobs, store):
         wait_until(simulating(family, 1))
         wait_until(lambda: gives_way(family.rank(0)))
         job_processes = family.descendants()
-        assert jobs.dismiss(job.id).status is Status.DISMISSED
+        assert jobs.dismiss(job.id).status is JobStatus.DISMISSED
         wait_until(lambda: not alive(job_processes), SECONDS_TO_DISMISS)
         wait_until(finished(jobs, following))
-    assert jobs.get(job.id).status is Status.DISMISSED
+    assert jobs.get(job.id).status is JobStatus.DISMISSED
     assert made(store).keys() == {following.key}
 
 
@@ -154,7 +154,7 @@ def test_a_stopped_worker_gives_its_job_back(jobs, store, number):
         family.worker.send_signal(number)
         assert family.worker.wait(SECONDS_TO_DISMISS) == 0
         assert family.members() == []
-    assert jobs.get(job.id).status is Status.ACCEPTED
+    assert jobs.get(job.id).status is JobStatus.ACCEPTED
     assert jobs.lease("another") is not None, "without waiting for the lease to run out"
 
 
@@ -165,7 +165,7 @@ def test_a_worker_ends_with_its_input_if_asked(jobs, store):
         family.worker.stdin.close()
         assert family.worker.wait(SECONDS_TO_DISMISS) == 0
         assert family.members() == []
-    assert jobs.get(job.id).status is Status.ACCEPTED
+    assert jobs.get(job.id).status is JobStatus.ACCEPTED
 
 
 VICTIMS: dict[str, Callable[[Family], psutil.Process]] = {
@@ -196,7 +196,7 @@ def test_a_kill_leaves_no_process_loses_no_job_and_repeats_no_run(jobs, store, v
         else:
             wait_until(finished(jobs, job))
     done = jobs.get(job.id)
-    assert (done.status, done.message) == (Status.SUCCEEDED, "2 of 2 points converged")
+    assert (done.status, done.message) == (JobStatus.SUCCEEDED, "2 of 2 points converged")
     assert done.attempts == 2
     assert kept.items() <= made(store).items(), "a committed run was made again"
     with Store.existing(store) as opened:
@@ -211,7 +211,7 @@ def test_a_job_that_is_always_cut_short_is_given_up(jobs, store):
         jobs.give_back(lease, "cut short")
     with working(store):
         wait_until(finished(jobs, job))
-    assert jobs.get(job.id).status is Status.FAILED
+    assert jobs.get(job.id).status is JobStatus.FAILED
     assert str(MAXIMUM_ATTEMPTS) in jobs.get(job.id).message
     assert not jobs.log_path(job).exists()
 
@@ -219,21 +219,27 @@ def test_a_job_that_is_always_cut_short_is_given_up(jobs, store):
 @pytest.mark.parametrize(
     ("kind", "status", "output", "last_words", "expected"),
     [
-        (Kind.SCENE, 2, "", "ensemble: flow.rate: no", JobResult(Status.FAILED, "ensemble: flow.rate: no")),
-        (Kind.SCENE, 1, "", "", JobResult(Status.FAILED, "ended with status 1")),
+        (
+            Kind.SCENE,
+            2,
+            "",
+            "ensemble: flow.rate: no",
+            JobResult(JobStatus.FAILED, "ensemble: flow.rate: no"),
+        ),
+        (Kind.SCENE, 1, "", "", JobResult(JobStatus.FAILED, "ended with status 1")),
         (
             Kind.SCENE,
             1,
             json.dumps({"outcome": "failed", "failure": "underflow"}),
             "warning",
-            JobResult(Status.FAILED, "underflow"),
+            JobResult(JobStatus.FAILED, "underflow"),
         ),
         (
             Kind.SCENE,
             0,
             json.dumps({"outcome": "separated", "failure": None}),
             "",
-            JobResult(Status.SUCCEEDED, "separated"),
+            JobResult(JobStatus.SUCCEEDED, "separated"),
         ),
     ],
 )

@@ -10,8 +10,8 @@ from pathlib import Path
 import httpx
 import pytest
 
-from api.auth.callers import is_loopback
-from api.auth.scope import Scope
+from api.auth import TokenScope
+from api.auth.authentication import is_loopback
 from tests.api.servers import client_of, make_token, serving
 
 SUBMISSION = {"preset": "doublet-shear"}
@@ -40,7 +40,7 @@ def test_without_tokens_another_name_for_this_machine_is_refused(submitting, hos
 
 
 def test_with_tokens_one_is_needed(store):
-    token = make_token(store, "ada", Scope.READ)
+    token = make_token(store, "ada", TokenScope.READ)
     with client_of(store) as client:
         for path in PROTECTED:
             refused = client.get(path)
@@ -52,8 +52,8 @@ def test_with_tokens_one_is_needed(store):
 
 
 def test_scopes_include_each_other_in_order(store):
-    tokens = {scope: make_token(store, "ada", scope) for scope in Scope}
-    expected = {Scope.READ: (200, 403), Scope.SUBMIT: (200, 202), Scope.ADMIN: (200, 202)}
+    tokens = {scope: make_token(store, "ada", scope) for scope in TokenScope}
+    expected = {TokenScope.READ: (200, 403), TokenScope.SUBMIT: (200, 202), TokenScope.ADMIN: (200, 202)}
     with client_of(store) as client:
         for scope, token in tokens.items():
             read = client.get("/jobs", headers=bearer(token))
@@ -62,7 +62,7 @@ def test_scopes_include_each_other_in_order(store):
 
 
 def test_jobs_belong_to_the_user_of_the_token(store):
-    tokens = [make_token(store, user, Scope.SUBMIT) for user in ("ada", "bob", "ada")]
+    tokens = [make_token(store, user, TokenScope.SUBMIT) for user in ("ada", "bob", "ada")]
     with client_of(store) as client:
         jobs = [client.post("/jobs", json=SUBMISSION, headers=bearer(token)).json() for token in tokens]
         assert [job["owner"] for job in jobs] == ["ada", "bob", "ada"]
@@ -71,7 +71,7 @@ def test_jobs_belong_to_the_user_of_the_token(store):
 
 
 def test_the_same_idempotency_key_of_two_users_is_two_jobs(store):
-    tokens = [make_token(store, user, Scope.SUBMIT) for user in ("ada", "bob")]
+    tokens = [make_token(store, user, TokenScope.SUBMIT) for user in ("ada", "bob")]
     with client_of(store) as client:
         jobs = [
             client.post("/jobs", json=SUBMISSION, headers=bearer(token) | {"Idempotency-Key": "1"}).json()
@@ -81,15 +81,15 @@ def test_the_same_idempotency_key_of_two_users_is_two_jobs(store):
 
 
 def test_a_token_ends_when_it_said_it_would(store):
-    valid = make_token(store, "ada", Scope.READ)
-    expired = make_token(store, "ada", Scope.READ, timedelta(seconds=-1))
+    valid = make_token(store, "ada", TokenScope.READ)
+    expired = make_token(store, "ada", TokenScope.READ, timedelta(seconds=-1))
     with client_of(store) as client:
         assert client.get("/jobs", headers=bearer(valid)).status_code == 200
         assert client.get("/jobs", headers=bearer(expired)).status_code == 401
 
 
 def test_a_service_whose_tokens_have_all_ended_is_not_open(store):
-    make_token(store, "ada", Scope.READ, timedelta(seconds=-1))
+    make_token(store, "ada", TokenScope.READ, timedelta(seconds=-1))
     with client_of(store) as client:
         assert client.get("/jobs").status_code == 401
 
@@ -103,7 +103,7 @@ def near_misses(token: str) -> list[str]:
 
 
 def test_nothing_but_the_whole_token_will_do(store):
-    token = make_token(store, "ada", Scope.ADMIN)
+    token = make_token(store, "ada", TokenScope.ADMIN)
     with client_of(store, refusal_rate="100000/second") as client:
         for wrong in near_misses(token):
             assert client.get("/jobs", headers=bearer(wrong)).status_code == 401, wrong
@@ -115,7 +115,7 @@ def test_nothing_but_the_whole_token_will_do(store):
 
 
 def test_guessing_is_cut_short(store):
-    token = make_token(store, "ada", Scope.READ)
+    token = make_token(store, "ada", TokenScope.READ)
     with client_of(store, refusal_rate="5/minute") as client:
         statuses = [client.get("/jobs", headers=bearer(f"guess.{number}")).status_code for number in range(8)]
         assert statuses == [401] * 5 + [429] * 3
@@ -125,7 +125,7 @@ def test_guessing_is_cut_short(store):
 
 
 def test_the_database_has_no_token(store):
-    token = make_token(store, "ada", Scope.ADMIN)
+    token = make_token(store, "ada", TokenScope.ADMIN)
     secret = token.split(".")[1]
     for file in store.rglob("*"):
         if file.is_file():

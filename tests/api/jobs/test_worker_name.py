@@ -6,10 +6,10 @@ import subprocess
 import sys
 import time
 
-from api.worker.worker_name import has_died, own_name
+from api.jobs.worker_name import has_died, own_name
 from tests.api.processes import run_python
 
-NAMING = "from api.worker.worker_name import own_name; print(own_name(), flush=True)"
+NAMING = "from api.jobs.worker_name import own_name; print(own_name(), flush=True)"
 WAITING = f"{NAMING}; input()"
 
 

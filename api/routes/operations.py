@@ -1,0 +1,75 @@
+"""What operators and their monitoring ask: whether the service is up and ready, and its metrics."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from http import HTTPStatus
+
+from fastapi import APIRouter, Request, Response
+from fastapi.responses import PlainTextResponse
+from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, generate_latest
+from prometheus_client.metrics_core import GaugeMetricFamily, Metric
+from prometheus_client.registry import Collector
+from pydantic import BaseModel
+from sqlalchemy.exc import SQLAlchemyError
+
+from api.http.problems import Problem, documented
+from api.jobs.job_queue import Jobs
+from api.routes.service import Reader, service_of
+
+health_router = APIRouter(tags=["operations"])
+metrics_router = APIRouter(tags=["operations"])
+
+
+class Health(BaseModel):
+    """State of the service."""
+
+    status: str
+
+
+class JobMetrics(Collector):
+    """Number of jobs by status, read from the database when Prometheus asks.
+
+    Parameters
+    ----------
+    jobs : Jobs
+    """
+
+    def __init__(self, jobs: Jobs) -> None:
+        self._jobs = jobs
+
+    def collect(self) -> Iterator[Metric]:
+        """Yield the number of jobs of each status."""
+        (family,) = self.describe()
+        for status, count in self._jobs.counts().items():
+            family.add_metric((status,), count)
+        yield family
+
+    def describe(self) -> list[GaugeMetricFamily]:
+        """Return the metric without values, so that registering it does not read the database."""
+        return [GaugeMetricFamily("ensemble_jobs", "Jobs by status.", labels=("status",))]
+
+
+@health_router.get("/healthz")
+async def check_alive() -> Health:
+    """Answer as long as the process runs."""
+    return Health(status="alive")
+
+
+@health_router.get("/readyz", responses=documented(HTTPStatus.SERVICE_UNAVAILABLE))
+def check_ready(request: Request) -> Health:
+    """Answer with 200 if the store and the database of jobs can be read, else with 503."""
+    service = service_of(request)
+    try:
+        service.jobs.counts()
+        service.store.boundaries_page(limit=1)
+    except SQLAlchemyError as error:
+        raise Problem(HTTPStatus.SERVICE_UNAVAILABLE, "the store or the database cannot be read") from error
+    return Health(status="ready")
+
+
+@metrics_router.get("/metrics", response_class=PlainTextResponse)
+def get_metrics(request: Request, reader: Reader) -> Response:
+    """Give metrics in the text format of Prometheus: requests, their times, and jobs by status."""
+    registry: CollectorRegistry = request.app.state.registry
+    return Response(generate_latest(registry), media_type=CONTENT_TYPE_LATEST)
