@@ -1,6 +1,6 @@
-"""Many vesicles in a few lines: what a scene may hold instead of its list of vesicles.
+"""Many vesicles in a few lines: what a scene may have instead of its list of vesicles.
 
-It is turned into that list when the scene is checked, so nothing else ever meets an arrangement.
+Validation turns it into that list, so no other module sees an arrangement.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from solver.model import Model, Positive
-from solver.scene.distribution import Distribution, Normal, Uniform, drawn, ends
+from solver.scene.distribution import Distribution, Normal, Uniform, ends, samples
 from solver.scene.ellipses import semi_axes
 from solver.scene.placement import placed_at_random
 from solver.scene.vesicle import Vesicle
@@ -22,14 +22,25 @@ MOST_VESICLES = 4096
 
 
 class Lattice(Model):
-    """Equal vesicles in columns and rows about the origin, at equal distances, all turned alike."""
+    """Equal vesicles in columns and rows about the origin, at equal distances and angles.
+
+    Attributes
+    ----------
+    columns, rows : int
+    spacing : (2,)
+        Distance of neighboring centers along x and y.
+    staggered : bool
+        Whether every second row is shifted by half a spacing.
+    vesicle : Vesicle
+        The one that is repeated; the lattice has its middle at the center of this one.
+    """
 
     kind: Literal["lattice"] = "lattice"
     columns: int = Field(ge=1, le=MOST_VESICLES)
     rows: int = Field(ge=1, le=MOST_VESICLES)
-    spacing: tuple[Positive, Positive]  # of neighboring centers along x and y
-    staggered: bool = False  # every second row shifted by half a spacing
-    vesicle: Vesicle = Vesicle()  # at whose center the lattice lies
+    spacing: tuple[Positive, Positive]
+    staggered: bool = False
+    vesicle: Vesicle = Vesicle()
 
     @model_validator(mode="after")
     def _not_too_many(self) -> Self:
@@ -43,35 +54,49 @@ class Lattice(Model):
         return self.columns * self.rows
 
     def vesicles(self) -> tuple[Vesicle, ...]:
-        """The vesicles, row by row from below."""
+        """Return the vesicles, row by row from below."""
         across, up = self.spacing
-        found = []
+        placed = []
         for row in range(self.rows):
             shift = 0.25 * across * (-1 if row % 2 else 1) if self.staggered else 0.0
             for column in range(self.columns):
                 x = (column - (self.columns - 1) / 2) * across + shift
                 y = (row - (self.rows - 1) / 2) * up
                 center = (self.vesicle.center[0] + x, self.vesicle.center[1] + y)
-                found.append(self.vesicle.model_copy(update={"center": center}))
-        return tuple(found)
+                placed.append(self.vesicle.model_copy(update={"center": center}))
+        return tuple(placed)
 
 
 class Random(Model):
     """Vesicles at random places in a square about the origin, none nearer to another than stated.
 
-    Equal arrangements, seed included, are equal vesicles.
+    Equal arrangements, seed included, give equal vesicles.
+
+    Attributes
+    ----------
+    count : int
+    area_fraction : float
+        Area of all vesicles over that of the square.
+    seed : int
+    minimum_distance : float
+        Between the ellipses.
+    reduced_area, length : float, Uniform or Normal
+    angle : float or None
+        Of the long axes against x, radians; None for random ones.
+    bending_modulus, viscosity_contrast : float
+        As of `Vesicle`.
     """
 
     kind: Literal["random"] = "random"
     count: int = Field(ge=1, le=MOST_VESICLES)
-    area_fraction: float = Field(gt=0, lt=1)  # of the square that the vesicles lie in
+    area_fraction: float = Field(gt=0, lt=1)
     seed: int = Field(0, ge=0)
     minimum_distance: Positive = 0.2
     reduced_area: Distribution = 0.9
     length: Distribution = 2 * math.pi
-    angle: float | None = None  # of the long axes against x, radians; None: random
+    angle: float | None = None
     bending_modulus: Positive = 1.0
-    viscosity_contrast: Positive = 1.0  # of the fluid inside to that outside
+    viscosity_contrast: Positive = 1.0
 
     @field_validator("reduced_area")
     @classmethod
@@ -96,15 +121,15 @@ class Random(Model):
         return self
 
     def vesicles(self) -> tuple[Vesicle, ...]:
-        """The vesicles, in no particular order of place or size."""
-        return _drawn(self)
+        """Return the vesicles, in no particular order of place or size."""
+        return _randomly_placed(self)
 
 
-@lru_cache(maxsize=32)  # a scene is checked more than once on its way
-def _drawn(arrangement: Random) -> tuple[Vesicle, ...]:
+@lru_cache(maxsize=32)  # a scene is validated more than once
+def _randomly_placed(arrangement: Random) -> tuple[Vesicle, ...]:
     count, random = arrangement.count, np.random.default_rng(arrangement.seed)
-    reduced_area = drawn(arrangement.reduced_area, count, random)
-    length = drawn(arrangement.length, count, random)
+    reduced_area = samples(arrangement.reduced_area, count, random)
+    length = samples(arrangement.length, count, random)
     axes = np.array([semi_axes(*shape) for shape in zip(reduced_area, length, strict=True)])
     area = float(np.sum(reduced_area * length**2) / (4 * np.pi))
     side = math.sqrt(area / arrangement.area_fraction)

@@ -8,13 +8,28 @@ from solver.model import Model, NonNegative, Positive
 
 
 class Criteria(Model):
-    """When a run is decided.  The criteria are part of the answer and are stored with it."""
+    """When a run is decided.  The criteria are part of the answer and are stored with it.
 
-    # Center distance that counts as separated when passed outward; 1.5 times the first one if that is more.
+    Attributes
+    ----------
+    separated_distance : float
+        Center distance beyond which a pair that moves apart is separated; 1.5 times the first distance if
+        that is more.
+    revolutions : int
+        Full turns that the line of centers of a bound pair has made, or the long axis of a tumbling vesicle.
+    gap_growth : float
+        Relative growth of the largest gap, from one half turn to the next, that a bound pair may have.
+    steady_rate : float
+        A state is steady if no tangent angle and no center changes faster.
+    steady_time : float
+        For at least this long.
+    extensions : float
+        Multiple of the horizon up to which an undecided pair runs on, in a flow where it may.
+    """
+
     separated_distance: Positive = 12.0
-    # Of the line of centers that a bound pair has completed, or of its long axis that a tumbling vesicle has.
     revolutions: int = Field(1, ge=1)
-    gap_growth: NonNegative = 0.01  # relative growth of the gap's maximum that still counts as none
-    steady_rate: Positive = 1e-5  # change of every tangent angle and center below which a state is steady
-    steady_time: Positive = 5.0  # for at least this long
-    extensions: float = Field(4.0, ge=1)  # an undecided run may go on to this multiple of the horizon
+    gap_growth: NonNegative = 0.01
+    steady_rate: Positive = 1e-5
+    steady_time: Positive = 5.0
+    extensions: float = Field(4.0, ge=1)

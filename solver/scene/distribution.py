@@ -1,4 +1,4 @@
-"""How a quantity varies among the vesicles of an arrangement: one number for all, or drawn for each."""
+"""How a quantity varies among the vesicles of an arrangement: one for all, or a random one for each."""
 
 from __future__ import annotations
 
@@ -12,11 +12,17 @@ from solver.model import Model, NonNegative
 
 Array = NDArray[np.float64]
 
-DEVIATIONS = 2.0  # beyond which a normal distribution is cut off
+DEVIATIONS = 2.0  # standard deviations, beyond which a normal distribution is cut off
 
 
 class Uniform(Model):
-    """Equally likely from `low` to `high`."""
+    """A uniform distribution.
+
+    Attributes
+    ----------
+    low, high : float
+        Ends of the interval.
+    """
 
     kind: Literal["uniform"] = "uniform"
     low: float
@@ -34,12 +40,29 @@ class Uniform(Model):
         return self.low, self.high
 
     def draw(self, count: int, random: np.random.Generator) -> Array:
-        """Independent values, (count,)."""
+        """Draw independent values.
+
+        Parameters
+        ----------
+        count : int
+        random : Generator
+
+        Returns
+        -------
+        (count,)
+        """
         return random.uniform(self.low, self.high, count)
 
 
 class Normal(Model):
-    """Normal with this mean and standard deviation, cut off at twice the deviation from the mean."""
+    """A normal distribution, cut off at `DEVIATIONS` standard deviations from its mean.
+
+    Attributes
+    ----------
+    mean : float
+    deviation : float
+        Standard deviation before the tails are cut off.
+    """
 
     kind: Literal["normal"] = "normal"
     mean: float
@@ -51,7 +74,17 @@ class Normal(Model):
         return self.mean - DEVIATIONS * self.deviation, self.mean + DEVIATIONS * self.deviation
 
     def draw(self, count: int, random: np.random.Generator) -> Array:
-        """Independent values, (count,)."""
+        """Draw independent values.
+
+        Parameters
+        ----------
+        count : int
+        random : Generator
+
+        Returns
+        -------
+        (count,)
+        """
         from scipy.stats import truncnorm  # for the reason that `solver.membrane.shapes` gives
 
         scaled = truncnorm.rvs(-DEVIATIONS, DEVIATIONS, size=count, random_state=random)
@@ -70,12 +103,34 @@ Distribution = Annotated[
 
 
 def ends(distribution: float | Uniform | Normal) -> tuple[float, float]:
-    """The least and the largest value that can be drawn."""
+    """Return the least and the largest value that can be drawn.
+
+    Parameters
+    ----------
+    distribution : float, Uniform or Normal
+
+    Returns
+    -------
+    low : float
+    high : float
+    """
     return (distribution, distribution) if isinstance(distribution, int | float) else distribution.ends
 
 
-def drawn(distribution: float | Uniform | Normal, count: int, random: np.random.Generator) -> Array:
-    """Values for ``count`` vesicles, (count,)."""
+def samples(distribution: float | Uniform | Normal, count: int, random: np.random.Generator) -> Array:
+    """Draw a value for each vesicle.
+
+    Parameters
+    ----------
+    distribution : float, Uniform or Normal
+    count : int
+        Number of vesicles.
+    random : Generator
+
+    Returns
+    -------
+    (count,)
+    """
     if isinstance(distribution, int | float):
         return np.full(count, float(distribution))
     return distribution.draw(count, random)

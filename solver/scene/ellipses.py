@@ -28,10 +28,22 @@ _REFINEMENTS = 40  # each narrows the interval of directions by the golden ratio
 
 @lru_cache(1024)  # the vesicles of a scene, and the scenes of a study, are alike
 def semi_axes(reduced_area: float, length: float) -> tuple[float, float]:
-    """Semi-axes a ≥ b of the ellipse with this perimeter and reduced area 4π·area/length².
+    """Return the semi-axes a ≥ b of the ellipse with this perimeter and reduced area.
 
     The perimeter is 4aE(m) with m = 1 − b²/a² (complete elliptic integral of the second kind), so the
     reduced area is π²√(1−m)/(4E(m)²), which falls from 1 to 0 as the aspect ratio falls.
+
+    Parameters
+    ----------
+    reduced_area : float
+        4π·area/length².
+    length : float
+        Perimeter.
+
+    Returns
+    -------
+    major : float
+    minor : float
     """
     from scipy.optimize import brentq
     from scipy.special import ellipe
@@ -50,11 +62,15 @@ def semi_axes(reduced_area: float, length: float) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Ellipses:
-    """Any number of ellipses in the complex plane; all arrays are (M,).
+    """Any number of ellipses in the complex plane.
 
-    center, axis : complex
-        `axis` is the unit vector along the long axis.
-    major, minor : semi-axes
+    Attributes
+    ----------
+    center : complex (M,)
+    axis : complex (M,)
+        Unit vectors along the long axes.
+    major, minor : (M,)
+        Semi-axes.
     """
 
     center: ComplexArray
@@ -64,17 +80,36 @@ class Ellipses:
 
     @classmethod
     def of(cls, vesicles: Iterable[Vesicle]) -> Self:
-        """The ellipses as which these vesicles start."""
+        """Make the ellipses in whose shape and place vesicles start.
+
+        Parameters
+        ----------
+        vesicles : iterable of Vesicle
+
+        Returns
+        -------
+        Ellipses
+        """
         placed = [(complex(*v.center), v.angle, *semi_axes(v.reduced_area, v.length)) for v in vesicles]
         center, angle, major, minor = (np.array(column) for column in zip(*placed, strict=True))
         return cls(center, np.exp(1j * angle), major, minor)
 
     def __getitem__(self, index: Any) -> Ellipses:
-        """Some of them."""
+        """Return some of the ellipses."""
         return Ellipses(self.center[index], self.axis[index], self.major[index], self.minor[index])
 
     def support(self, direction: ComplexArray) -> Array:
-        """How far each reaches from its center in unit directions (M,) or (M, directions)."""
+        """Return how far each ellipse reaches from its center in given directions.
+
+        Parameters
+        ----------
+        direction : complex (M,) or (M, directions)
+            Unit vectors.
+
+        Returns
+        -------
+        (M,) or (M, directions)
+        """
         shape = (-1,) + (1,) * (direction.ndim - 1)
         along = direction * self.axis.conj().reshape(shape)
         return np.asarray(
@@ -83,17 +118,38 @@ class Ellipses:
 
 
 def _around(first: Ellipses, second: Ellipses) -> Array:
-    """Distances between the circles around ellipses, (M,): the simplest of lower bounds."""
+    """Return the distances between the circles around ellipses, the simplest lower bound."""
     return np.asarray(np.abs(first.center - second.center) - first.major - second.major)
 
 
 def clearances(first: Ellipses, second: Ellipses) -> Array:
-    """Lower bounds of the distances between ellipses, (M,), short of them by at most 1e-3 of their size."""
+    """Return lower bounds of the distances between ellipses, too low by at most 1e-3 of their size.
+
+    Parameters
+    ----------
+    first, second : Ellipses
+        M each.
+
+    Returns
+    -------
+    (M,)
+    """
     return np.asarray(_strips(first, second, _FEW_DIRECTIONS)[0].max(axis=1))
 
 
 def distances(first: Ellipses, second: Ellipses) -> Array:
-    """Distances between ellipses to round-off, (M,); negative where they overlap."""
+    """Return the distances between ellipses, to round-off.
+
+    Parameters
+    ----------
+    first, second : Ellipses
+        M each.
+
+    Returns
+    -------
+    (M,)
+        Negative where they overlap.
+    """
     widths, angles = _strips(first, second, _DIRECTIONS)
     step = 2 * np.pi / _DIRECTIONS
     low = angles[widths.argmax(axis=1)] - step
@@ -107,10 +163,19 @@ def distances(first: Ellipses, second: Ellipses) -> Array:
 
 
 def overlapping_pair(vesicles: tuple[Vesicle, ...]) -> tuple[int, int] | None:
-    """Indices of the first two starting ellipses that touch or overlap; None if all are apart.
+    """Return the indices of the first two vesicles that touch or overlap at the start.
 
-    Only neighbors are compared, found in a tree: the work grows like the number of vesicles.  Most of
-    them are apart by a lower bound of their distance already.
+    Only neighbors are compared, found in a tree, so the work grows like the number of vesicles.  For most of
+    them a lower bound of the distance is enough.
+
+    Parameters
+    ----------
+    vesicles : tuple of Vesicle
+
+    Returns
+    -------
+    (int, int) or None
+        None if all are apart.
     """
     from scipy.spatial import cKDTree  # for the reason that `solver.membrane.shapes` gives
 
@@ -127,7 +192,7 @@ def overlapping_pair(vesicles: tuple[Vesicle, ...]) -> tuple[int, int] | None:
 
 
 def _strips(first: Ellipses, second: Ellipses, count: int) -> tuple[Array, Array]:
-    """Width of the strip between two ellipses (M, ``count``) across directions at these angles."""
+    """Return the widths (M, ``count``) of strips between ellipses, and the angles across which they lie."""
     angles = 2 * np.pi * np.arange(count) / count
     directions = np.broadcast_to(np.exp(1j * angles), (len(first.center), count))
     return _width(first, second, directions), angles

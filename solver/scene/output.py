@@ -6,7 +6,15 @@ from solver.model import Model, Positive
 
 
 class Output(Model):
-    """How often diagnostics (``interval``) and states (``frame_interval``) are recorded."""
+    """How often a run is recorded.
+
+    Attributes
+    ----------
+    interval : float
+        Time between diagnostics.
+    frame_interval : float
+        Time between recorded states.
+    """
 
     interval: Positive = 0.5
     frame_interval: Positive = 1.0

@@ -1,9 +1,9 @@
-"""Finds random places for ellipses in a square so that no two are nearer than a given distance.
+"""Random places for ellipses in a square, no two of them nearer than a given distance.
 
-Where there is room, each is put at random places until one is free (random sequential adsorption; Widom, J.
-Chem. Phys. 44, 3888 (1966)), the large ones first.  That ends far below dense packings: where it fails, all
-start aligned on a lattice that fills the square, and random moves, refused when they come too near, make
-it forget the lattice (Metropolis et al., J. Chem. Phys. 21, 1087 (1953), for hard particles).
+Where there is room, each ellipse is put at random places until one is free, the large ones first (random
+sequential adsorption; Widom 1966).  This reaches only densities far below that of dense packings.  Where it
+fails, all ellipses start aligned on a lattice that fills the square, and random moves, refused where two
+would come too near, make them forget the lattice (Metropolis et al. 1953, for hard particles).
 """
 
 from __future__ import annotations
@@ -25,27 +25,33 @@ _SWEEPS = 20  # moves of every ellipse, from the lattice
 def placed_at_random(
     axes: Array, side: float, distance: float, angle: float | None, random: np.random.Generator
 ) -> tuple[ComplexArray, Array]:
-    """Centers (M,) and angles (M,) of ellipses that lie in the square |x|, |y| ≤ ``side``/2.
+    """Place ellipses in the square |x|, |y| ≤ ``side``/2.
 
     Parameters
     ----------
     axes : (M, 2)
         Semi-axes, the longer one first.
+    side : float
     distance : float
         Least distance of any two.
     angle : float or None
-        Of all long axes; None: random ones.
+        Of all long axes against x, radians; None for random ones.
     random : Generator
+
+    Returns
+    -------
+    centers : complex (M,)
+    angles : (M,)
 
     Raises
     ------
     ValueError
-        If no places were found.
+        If there is no room for all.
     """
-    found = _one_by_one(axes, side, distance, angle, random)
-    if found is None:
-        found = _from_a_lattice(axes, side, distance, angle, random)
-    return found.center, np.angle(found.axis)
+    ellipses = _one_by_one(axes, side, distance, angle, random)
+    if ellipses is None:
+        ellipses = _from_a_lattice(axes, side, distance, angle, random)
+    return ellipses.center, np.angle(ellipses.axis)
 
 
 def _one_by_one(
@@ -59,8 +65,8 @@ def _one_by_one(
     for rank, index in enumerate(order):
         before = placed[order[:rank]]
         for _ in range(_TRIES):
-            turned = random.uniform(0, np.pi) if angle is None else angle
-            placed.axis[index] = np.exp(1j * turned)
+            chosen = random.uniform(0, np.pi) if angle is None else angle
+            placed.axis[index] = np.exp(1j * chosen)
             room = side / 2 - _extent(placed[[index]])
             if room.min() < 0:
                 continue
@@ -100,13 +106,13 @@ def _from_a_lattice(
 
 
 def _all_as_the_largest(axis: ComplexArray, axes: Array) -> Ellipses:
-    """Ellipses on the origin that hold any of the shapes."""
+    """Return ellipses on the origin, each as large as the largest in both axes."""
     major, minor = (np.full(len(axes), largest) for largest in axes.max(axis=0))
     return Ellipses(np.zeros(len(axes), complex), axis, major, minor)
 
 
 def _widest_lattice(count: int, side: float, ellipses: Ellipses) -> tuple[ComplexArray, float]:
-    """Centers (count,) in staggered rows that fill the square, and how far apart equal ellipses are there."""
+    """Return centers (count,) in staggered rows that fill the square, and the gap between equal ellipses."""
     width, height = side - 2 * _extent(ellipses[:1])
     best, widest = np.zeros(count, complex), -math.inf
     if min(width, height) < 0:
@@ -131,7 +137,7 @@ def _widest_lattice(count: int, side: float, ellipses: Ellipses) -> tuple[Comple
 
 
 def _extent(ellipse: Ellipses) -> Array:
-    """How far a single ellipse reaches from its center along x and y, (2,)."""
+    """Return how far a single ellipse reaches from its center along x and y, (2,)."""
     return ellipse.support(np.array([[1.0, 1.0j]]))[0]
 
 

@@ -21,15 +21,32 @@ from solver.scene.output import Output
 from solver.scene.start import Start
 from solver.scene.vesicle import Vesicle
 
-# Vesicles up to which matrices over all points are kept; measured: beyond, sums are faster (`solver.motion.summed`).
+# Vesicles up to which matrices over all points are kept.  Beyond, sums are faster (measured).
 LARGEST_DENSE = 6
 
 
 class Scene(Model):
-    """Everything a run depends on."""
+    """Everything that a run depends on.
+
+    Attributes
+    ----------
+    horizon : float
+        Time at which a run ends that is not decided before.
+    arrangement : Arrangement or None
+        May be given instead of the vesicles.  Validation turns it into these; in a validated scene it is
+        None.
+    vesicles : tuple of Vesicle
+    adhesion : Adhesion or None
+        None if nothing adheres.
+    flow : ImposedFlow or None
+        None if the fluid is quiescent.
+    start : Start
+    numerics : Numerics
+    criteria : Criteria
+    output : Output
+    """
 
     horizon: Positive
-    # Instead of the vesicles, into which it is turned here: a scene that has been checked has none.
     arrangement: Arrangement | None = Field(None, exclude=True)
     vesicles: tuple[Vesicle, ...] = Field((), validate_default=True)
     adhesion: Adhesion | None = None
@@ -75,10 +92,7 @@ class Scene(Model):
 
     @property
     def many(self) -> bool:
-        """Whether sums serve the scene better than matrices over all points.
-
-        They know no viscosity contrast.
-        """
+        """Whether sums are used instead of matrices over all points; they support no viscosity contrast."""
         return len(self.vesicles) > LARGEST_DENSE and all(v.viscosity_contrast == 1 for v in self.vesicles)
 
     @model_validator(mode="after")

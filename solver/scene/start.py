@@ -6,12 +6,19 @@ from solver.model import Model, Positive
 
 
 class Start(Model):
-    """How the run begins: as placed, or relaxed at rest first and then turned.
+    """How a run begins: with the vesicles as placed, or with a pair that has relaxed without flow.
 
-    ``relaxed`` relaxes the vesicles without flow to equilibrium and turns them so that the line of centers
-    lies on the diverging axis (y) plus ``tilt`` radians.
+    Attributes
+    ----------
+    relaxed : bool
+        Whether the pair relaxes to equilibrium first and is then rotated, so that its line of centers lies on
+        the diverging axis y plus ``tilt``.
+    horizon : float
+        Time by which the relaxation must have come to rest.
+    tilt : float
+        Radians.
     """
 
     relaxed: bool = False
-    horizon: Positive = 1000.0  # by which the relaxation must have come to rest
+    horizon: Positive = 1000.0
     tilt: float = 1e-3

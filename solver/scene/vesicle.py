@@ -10,11 +10,24 @@ from solver.model import Model, Positive
 
 
 class Vesicle(Model):
-    """An inextensible membrane that starts as an ellipse of exactly this reduced area and length."""
+    """An inextensible membrane that starts as an ellipse of exactly this reduced area and length.
 
-    reduced_area: float = Field(0.9, gt=0, le=1)  # 4π·area/length²
+    Attributes
+    ----------
+    reduced_area : float
+        4π·area/length².
+    length : float
+    bending_modulus : float
+    viscosity_contrast : float
+        Viscosity of the fluid inside over that outside.
+    center : (2,)
+    angle : float
+        Of the long axis against x, radians.
+    """
+
+    reduced_area: float = Field(0.9, gt=0, le=1)
     length: Positive = 2 * math.pi
     bending_modulus: Positive = 1.0
-    viscosity_contrast: Positive = 1.0  # of the fluid inside to that outside
+    viscosity_contrast: Positive = 1.0
     center: tuple[float, float] = (0.0, 0.0)
-    angle: float = math.pi / 2  # of the long axis against x, radians
+    angle: float = math.pi / 2
