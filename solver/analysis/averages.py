@@ -1,4 +1,4 @@
-"""What a finished run says about its scene, from the series that were recorded and the orbit of a pair."""
+"""Summary values of a finished run, from recorded series and from the revolutions that were followed."""
 
 from __future__ import annotations
 
@@ -30,10 +30,17 @@ def pair_inclination(center_angle: Array) -> Array:
 
 
 def inclination(scene: Scene, series: Series) -> float | None:
-    """Degrees: of the long axis of a single vesicle against x, or of a trapped pair as the paper defines it.
+    """Return the inclination at the end: of a single vesicle's long axis against x, or of a pair in strain.
 
-    For the pair it is 180° when the line of centers lies on the diverging axis and 90° when it lies on the
-    converging one (paper, figure 6).
+    Parameters
+    ----------
+    scene : Scene
+    series : Series
+
+    Returns
+    -------
+    float or None
+        Degrees; of a pair that of `pair_inclination`.  None where neither exists.
     """
     if "inclination_angle" in series:
         return float(np.degrees(series["inclination_angle"][-1]))
@@ -43,9 +50,23 @@ def inclination(scene: Scene, series: Series) -> float | None:
 
 
 def viscosity(
-    scene: Scene, series: Series, outcome: Outcome, turns: RevolutionTracker | None
+    scene: Scene, series: Series, outcome: Outcome, tracker: RevolutionTracker | None
 ) -> Viscosity | None:
-    """As `solver.analysis.run.Viscosity` says which average it is; None while it does not exist."""
+    """Return the average of the intrinsic viscosity that `solver.analysis.run.Viscosity` describes.
+
+    Parameters
+    ----------
+    scene : Scene
+    series : Series
+    outcome : Outcome
+    tracker : RevolutionTracker or None
+        Of the pair's line of centers or the single vesicle's long axis, where one was followed.
+
+    Returns
+    -------
+    Viscosity or None
+        None without a viscosity, and while there is no full turn to average over.
+    """
     if "viscosity_bending_tension" not in series:
         return None
     if outcome is Outcome.STEADY:
@@ -54,7 +75,7 @@ def viscosity(
             return float(series[name][-1])
 
     else:
-        interval = _averaged_over(scene, series, turns)
+        interval = _averaged_over(scene, series, tracker)
         if interval is None:
             return None
         first, last = interval
@@ -71,11 +92,11 @@ def viscosity(
 
 
 def _averaged_over(
-    scene: Scene, series: Series, turns: RevolutionTracker | None
+    scene: Scene, series: Series, tracker: RevolutionTracker | None
 ) -> tuple[float, float] | None:
-    """From when to when the viscosity of a run that is not steady is averaged; None while it cannot be."""
-    if turns:
-        return (turns.half_turns[-3], turns.half_turns[-1]) if turns.period else None
+    """Return the interval over which the viscosity of a run that is not steady is averaged, if there is one."""
+    if tracker:
+        return (tracker.half_turns[-3], tracker.half_turns[-1]) if tracker.period else None
     if len(scene.vesicles) == 1 or len(series["time"]) < 2:
         return None
     return float(series["time"][-1]) / 2, float(series["time"][-1])

@@ -1,8 +1,8 @@
-"""Which vesicles hold together: the graph of their contacts, and its connected parts, the clusters.
+"""Clusters of vesicles: the connected parts of the graph of their contacts.
 
-Two vesicles are in contact when their membranes are nearer than `CONTACT` times the adhesion's distance δ.
-Two points attract each other beyond δ, the most at 1.29 δ (exponents 4 and 2), and two membranes at rest
-are held at somewhat less than δ, so a pair this near is bound to each other unless the flow parts them.
+Two vesicles are in contact when their membranes are nearer than `CONTACT` times the adhesion distance δ.
+Beyond δ two points attract each other, most strongly at 1.29 δ (exponents 4 and 2), and two membranes at rest
+are somewhat nearer than δ.  So a pair in contact stays together unless the flow pulls it apart.
 """
 
 from __future__ import annotations
@@ -21,9 +21,20 @@ CONTACT = 1.5  # adhesion distances
 
 
 def contacts(geometry: Geometry, distance: float) -> NDArray[np.int64]:
-    """Pairs (k, 2) of vesicles of which two points are at most ``distance`` apart, each pair once.
+    """Return the pairs of vesicles that are in contact.
 
     Only near points are compared, found in a tree.
+
+    Parameters
+    ----------
+    geometry : Geometry
+    distance : float
+        At most so far apart are two points of vesicles in contact.
+
+    Returns
+    -------
+    (k, 2)
+        Each pair once.
     """
     points = geometry.points.reshape(2, -1).T
     near = cKDTree(points).query_pairs(distance, output_type="ndarray") // geometry.membranes.points
@@ -31,9 +42,19 @@ def contacts(geometry: Geometry, distance: float) -> NDArray[np.int64]:
 
 
 def clusters(geometry: Geometry, distance: float) -> Array:
-    """Number of the cluster of each vesicle, (M,).  A vesicle without contact is a cluster of its own.
+    """Return the number of the cluster of each vesicle.
 
-    Clusters are numbered from 0 by their first vesicle.
+    A vesicle without contact is a cluster of one.  Clusters are numbered from 0 by their first vesicle.
+
+    Parameters
+    ----------
+    geometry : Geometry
+    distance : float
+        As for `contacts`.
+
+    Returns
+    -------
+    (M,)
     """
     count = geometry.membranes.count
     first, second = contacts(geometry, distance).T
@@ -43,5 +64,15 @@ def clusters(geometry: Geometry, distance: float) -> Array:
 
 
 def cluster_sizes(labels: Array) -> NDArray[np.int64]:
-    """Number of vesicles in each cluster, from their labels (M,)."""
+    """Return the number of vesicles in each cluster.
+
+    Parameters
+    ----------
+    labels : (M,)
+        As of `clusters`.
+
+    Returns
+    -------
+    (clusters,)
+    """
     return np.bincount(labels.astype(np.int64))

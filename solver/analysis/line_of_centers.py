@@ -1,4 +1,4 @@
-"""The line of centers of two vesicles: its length, its angle, and when it has made each half turn."""
+"""The line of centers of two vesicles: its length, its angle, and the times of its half turns."""
 
 from __future__ import annotations
 
@@ -11,20 +11,28 @@ from solver.membrane.geometry import Membranes
 
 Array = NDArray[np.float64]
 
-# A pair may start beyond the separated distance; then it has to move this much farther than its start.
+# A pair may start beyond the separated distance.  Then it has to move farther apart by this factor.
 _FARTHER = 1.5
 
 
 class LineOfCenters(RevolutionTracker):
     """Follows the line of centers from step to step.
 
+    Parameters
+    ----------
+    membranes : Membranes
+    state : (state_size,)
+        At the start.
+    separated_distance : float
+        Distance beyond which a pair that moves apart counts as separated.
+
     Attributes
     ----------
     distance : float
         At the end of the last step.
     separated : bool
-        Whether the distance has passed the separated distance, or half as much again as at the start if that
-        is farther.
+        Whether the distance has passed the separated distance, or 1.5 times that at the start if that is
+        more.
     """
 
     ambiguity = 2 * np.pi
@@ -36,7 +44,17 @@ class LineOfCenters(RevolutionTracker):
         self.separated = False
 
     def advance(self, step: Step) -> Step:
-        """Follow one step, but no farther than to separation; return the part followed."""
+        """Follow one step, but no farther than to separation.
+
+        Parameters
+        ----------
+        step : Step
+
+        Returns
+        -------
+        Step
+            The part that was followed.
+        """
         if self.distance_of(step.state) >= self._separated_distance:
             self.separated = True
             step = step.until(
@@ -47,7 +65,16 @@ class LineOfCenters(RevolutionTracker):
         return step
 
     def distance_of(self, state: Array) -> float:
-        """Center distance in a state."""
+        """Return the center distance in a state.
+
+        Parameters
+        ----------
+        state : (state_size,)
+
+        Returns
+        -------
+        float
+        """
         return float(np.hypot(*self._offset(state)))
 
     def _direction(self, state: Array) -> float:

@@ -1,4 +1,4 @@
-"""When a line in the plane has made each half turn."""
+"""The times at which a line in the plane has made its half turns."""
 
 from __future__ import annotations
 
@@ -19,17 +19,25 @@ Array = NDArray[np.float64]
 class RevolutionTracker(ABC):
     """Follows the angle of a line from step to step.
 
+    Parameters
+    ----------
+    membranes : Membranes
+    state : (state_size,)
+        At the start.
+
     Attributes
     ----------
+    ambiguity : float
+        Angle by which the line may be rotated without a difference: 2π, or π without a direction.
     angle : float
         At the end of the last step; radians, unwrapped.
     half_turns : list of float
-        ``half_turns[k]`` is when the line had first turned by kπ from its start, either way.
+        ``half_turns[k]`` is the time at which the line had first turned by kπ from its start, either way.
     membranes : Membranes
-        Those of the steps; others may take their place.
+        Those of the steps.  Set it when the number of points changes.
     """
 
-    ambiguity: float  # what the line may be turned by without a difference
+    ambiguity: float
 
     def __init__(self, membranes: Membranes, state: Array) -> None:
         self.membranes = membranes
@@ -38,10 +46,20 @@ class RevolutionTracker(ABC):
 
     @abstractmethod
     def _direction(self, state: Array) -> float:
-        """Angle of the line up to the ambiguity."""
+        """Return the angle of the line, up to the ambiguity."""
 
     def advance(self, step: Step) -> Step:
-        """Follow one step; return the part followed."""
+        """Follow one step.
+
+        Parameters
+        ----------
+        step : Step
+
+        Returns
+        -------
+        Step
+            The part that was followed.
+        """
         angle = self.angle_of(step.state)
         while abs(angle - self._start) >= len(self.half_turns) * np.pi:
             self.half_turns.append(crossing(step, self._excess_turn))
@@ -49,22 +67,33 @@ class RevolutionTracker(ABC):
         return step
 
     def angle_of(self, state: Array) -> float:
-        """Angle of the line in a state less than half an ambiguity from the last step's."""
+        """Return the angle of the line in a state close to that of the last step.
+
+        Parameters
+        ----------
+        state : (state_size,)
+            Its angle differs from that of the last step by less than half the ambiguity.
+
+        Returns
+        -------
+        float
+            Radians, unwrapped.
+        """
         angle = self._direction(state)
         return angle + self.ambiguity * round((self.angle - angle) / self.ambiguity)
 
     @property
     def period(self) -> float | None:
-        """Duration of the last full turn, None before there is one."""
+        """Duration of the last full turn; None before the first one."""
         return self.half_turns[-1] - self.half_turns[-3] if len(self.half_turns) > 2 else None
 
     def _excess_turn(self, state: Array) -> float:
-        """How far the line has turned beyond the next half turn."""
+        """Return how far the line has turned beyond the next half turn, radians."""
         return abs(self.angle_of(state) - self._start) - len(self.half_turns) * np.pi
 
 
 class LongAxisTracker(RevolutionTracker):
-    """The long principal axis of a single vesicle, which has no head."""
+    """Follows the long principal axis of a single vesicle, a line without a direction."""
 
     ambiguity = np.pi
 
@@ -75,7 +104,18 @@ class LongAxisTracker(RevolutionTracker):
 
 
 def crossing(step: Step, excess: Callable[[Array], float]) -> float:
-    """When within a step the excess of a state becomes positive."""
+    """Return the time within a step at which a function of the state becomes positive.
+
+    Parameters
+    ----------
+    step : Step
+    excess : callable
+        From a state to a number that is positive at the end of the step.
+
+    Returns
+    -------
+    float
+    """
 
     def excess_at(time: float) -> float:
         return excess(step.interpolate(time))

@@ -1,7 +1,7 @@
 """Intrinsic viscosity of a dilute suspension in shear.
 
-With f the force of the membrane on the fluid, [μ] = −1/(rate·area) ∫ f_x y ds averaged over time; area is
-that of all vesicles (paper, section V; the sign follows from f).
+With f the force of the membrane on the fluid, [μ] = −1/(rate·area) ∫ f_x y ds averaged over time, where area
+is that of all vesicles (Quaife et al. 2019, section V; the sign follows from the direction of f).
 """
 
 from __future__ import annotations
@@ -16,19 +16,50 @@ Array = NDArray[np.float64]
 
 
 def shear_stress(geometry: Geometry, density: Array) -> float:
-    """−∫ f_x y ds of a force density (2, M, N) over all membranes."""
+    """Return the shear stress −∫ f_x y ds of a force density.
+
+    Parameters
+    ----------
+    geometry : Geometry
+    density : (2, M, N)
+        Force per length.
+
+    Returns
+    -------
+    float
+        Over all membranes, images included.
+    """
     moment = np.sum(density[0] * geometry.points[1], axis=1)
     return float(-geometry.membranes.copies * np.sum(moment * geometry.membranes.spacing))
 
 
 def membrane_stress(motion: Motion) -> float:
-    """The part of the shear stress that bending and tension cause."""
+    """Return the part of the shear stress that bending and tension cause.
+
+    Parameters
+    ----------
+    motion : Motion
+
+    Returns
+    -------
+    float
+    """
     geometry = motion.geometry
     tension_force = geometry.arclength_derivative(motion.tension * geometry.tangents)
     return shear_stress(geometry, motion.bending + tension_force)
 
 
 def adhesion_stress(motion: Motion) -> float:
-    """The part of the shear stress that adhesion causes; for a scene with adhesion."""
+    """Return the part of the shear stress that adhesion causes.
+
+    Parameters
+    ----------
+    motion : Motion
+        Of a scene with adhesion.
+
+    Returns
+    -------
+    float
+    """
     assert motion.adhesion is not None
     return shear_stress(motion.geometry, motion.adhesion)

@@ -29,14 +29,21 @@ class Outcome(StrEnum):
 
 @dataclass(frozen=True)
 class Viscosity:
-    """Intrinsic viscosity −∫ f_x y ds/(rate·area) by force, averaged over time.
+    """Intrinsic viscosity [μ] = −∫ f_x y ds/(rate·area) by force, averaged over time.
 
-    ``contrast`` is what fluids inside add whose viscosity differs.  No adhesion part without adhesion, and
-    none of a contrast without one.
+    The average is over the last full turn of a pair or of a tumbling vesicle and over the second half of a
+    run of three or more vesicles; otherwise it is the value of the steady state.  A dilute suspension with
+    the area fraction φ has the viscosity 1 + φ·[μ].
 
-    It is taken over a full turn, the last one, of a pair or of a tumbling vesicle, over the second half of a
-    run of three or more vesicles, and otherwise from the steady state.  A suspension with the area fraction φ
-    has the viscosity 1 + φ·[μ].
+    Attributes
+    ----------
+    total : float
+    bending_tension : float
+        Of the forces of the membranes.
+    adhesion : float or None
+        None without adhesion.
+    contrast : float or None
+        Of fluids inside whose viscosity differs from that outside; None without such.
     """
 
     total: float
@@ -47,7 +54,15 @@ class Viscosity:
 
 @dataclass(frozen=True)
 class Energy:
-    """Energies at the end: bending ½κ∫curvature² ds over all vesicles, adhesion over all pairs."""
+    """Energies at the end of a run.
+
+    Attributes
+    ----------
+    bending : float
+        ½κ∫curvature² ds over all vesicles.
+    adhesion : float or None
+        ∫∫φ ds ds over all pairs of vesicles; None without adhesion.
+    """
 
     bending: float
     adhesion: float | None
@@ -58,12 +73,18 @@ LARGEST_SPATIAL = 1e-3
 
 @dataclass(frozen=True)
 class Errors:
-    """Measured error indicators, worst over the run.
+    """Measured error indicators, the worst of the run.  `solver/README.md`, section 13, says what they mean.
 
-    area : relative drift of a vesicle's area.
-    closure : |∫(cos θ, sin θ) ds| / length.
-    temporal : accumulated local error of the state.
-    spatial : the largest of these: amplitude (radians) of the last third of the tangent angle's spectrum;
+    Attributes
+    ----------
+    area : float
+        Relative deviation of a vesicle's area from that of the scene.
+    closure : float
+        |∫(cos θ, sin θ) ds| / length.
+    temporal : float
+        Sum over the steps of the estimated local error of the state.
+    spatial : float
+        The largest of: the amplitude (radians) of the last third of the tangent angle's spectrum; the
         relative error of the single layer across a vesicle's waist; that of adhesion at the smallest gap.
         Beyond `LARGEST_SPATIAL` the points do not resolve the scene.
     """
@@ -76,7 +97,22 @@ class Errors:
 
 @dataclass(frozen=True)
 class Work:
-    """What the run cost."""
+    """What a run cost.
+
+    Attributes
+    ----------
+    steps, rejected_steps : int
+    rhs_evaluations : int
+        Of the equation of motion.
+    jacobian_evaluations, factorizations : int
+    wall_seconds : float
+    smallest_step : float or None
+        Of the accepted ones, in time; None if none was taken.
+    points : int or None
+        On each vesicle at the end; None in old records.
+    tension_iterations : int or None
+        None in old records.
+    """
 
     steps: int
     rejected_steps: int
@@ -84,9 +120,9 @@ class Work:
     jacobian_evaluations: int
     factorizations: int
     wall_seconds: float
-    smallest_step: float | None = None  # accepted, in time; None if none was taken
-    points: int | None = None  # on each vesicle at the end; None in records from before it could change
-    tension_iterations: int | None = None  # None in records from before they were counted
+    smallest_step: float | None = None
+    points: int | None = None
+    tension_iterations: int | None = None
 
 
 # Diagnostics by name, each of shape (time,) and sampled at `Series["time"]`.  Always present: time,
@@ -108,6 +144,8 @@ VesicleSeries = Mapping[str, Array]
 class Frames:
     """Recorded states, all with as many points as the last one.
 
+    Attributes
+    ----------
     time : (frames,)
     tangent_angle : (frames, vesicles, points)
     center : (frames, vesicles, 2)
@@ -122,7 +160,34 @@ class Frames:
 
 @dataclass(frozen=True)
 class Run:
-    """A finished simulation.  Quantities that the scene does not have are None."""
+    """A finished simulation.  Quantities that the scene does not have are None.
+
+    Attributes
+    ----------
+    scene : Scene
+    outcome : Outcome
+    failure : str or None
+        Why a run failed.
+    time : float
+        At the end.
+    period : float or None
+        Duration of the last full turn.
+    effective_aspect_ratio : float or None
+        Of the rigid ellipse with this period in the same flow.
+    inclination_angle : float or None
+        Degrees.
+    gap : float or None
+        Smallest distance between two membranes at the end.
+    viscosity : Viscosity or None
+    energy : Energy
+    error : Errors
+    work : Work
+    series : Series
+        Diagnostics against time.
+    frames : Frames
+    vesicle_series : VesicleSeries
+        Diagnostics of each vesicle against time.
+    """
 
     scene: Scene
     outcome: Outcome
@@ -130,7 +195,7 @@ class Run:
     time: float
     period: float | None
     effective_aspect_ratio: float | None
-    inclination_angle: float | None  # degrees
+    inclination_angle: float | None
     gap: float | None
     viscosity: Viscosity | None
     energy: Energy
