@@ -1,8 +1,8 @@
-"""Talks to a service from Python: submits jobs, waits for them, and reads boundaries and runs as arrays.
+"""A Python client of the service: submit jobs, wait for them, read boundaries and runs as arrays.
 
-with Client("http://127.0.0.1:8000") as client:
-    job = client.wait(client.submit("critical-hamaker", {"sweep.values": [0.5, 1.0]}))
-    boundary = client.boundary(job.key).to_xarray()
+>>> with Client("http://127.0.0.1:8000") as client:  # doctest: +SKIP
+...     job = client.wait(client.submit("critical-hamaker", {"sweep.values": [0.5, 1.0]}))
+...     boundary = client.boundary(job.key).to_xarray()
 """
 
 from __future__ import annotations
@@ -31,27 +31,34 @@ from solver.scene import Scene
 if TYPE_CHECKING:
     import xarray
 
-PATIENCE: Final = 60.0  # seconds for which a service that cannot be reached is asked again
-SECONDS_TO_ANSWER: Final = 30.0
+RETRY_SECONDS: Final = 60.0  # time for which requests to a service that cannot be reached are repeated
+TIMEOUT_SECONDS: Final = 30.0  # of one request
 
-# Nothing that is asked of a service is done twice when it is asked twice: a job carries an idempotency key.
-_persistent = retry(
+# Repeating a request is safe: a submission has an idempotency key, so it makes one job.
+_with_retries = retry(
     retry=retry_if_exception_type(httpx.TransportError),
     wait=wait_exponential(multiplier=0.1, max=5.0),
-    stop=stop_after_delay(PATIENCE),
+    stop=stop_after_delay(RETRY_SECONDS),
     reraise=True,
 )
 
 
 class Refused(EnsembleError):  # noqa: N818
-    """The service refuses a request; the message is its own and names the field.
+    """The service refuses a request. The message is that of the service and names the field.
+
+    Parameters
+    ----------
+    status : int
+        HTTP status.
+    problem : mapping
+        The whole answer (RFC 9457).
 
     Attributes
     ----------
     status : int
-        Of HTTP.
+        HTTP status.
     problem : dict
-        The whole answer, as RFC 9457 describes it.
+        The whole answer (RFC 9457).
     """
 
     def __init__(self, status: int, problem: Mapping[str, Any]) -> None:
@@ -61,12 +68,16 @@ class Refused(EnsembleError):  # noqa: N818
 
 
 class TracedBoundary(BoundaryDocument):
-    """A boundary as far as it is known."""
+    """A boundary in its present state."""
 
     def to_xarray(self) -> xarray.Dataset:
-        """Points along the swept parameter: critical value, bracket, outcomes, status.
+        """Return the points of the boundary along the swept parameter.
 
-        Numbers that are not known yet are NaN, outcomes empty.
+        Returns
+        -------
+        Dataset
+            Critical value, bracket, outcomes and status of each point. Numbers that are not known yet are
+            NaN, outcomes empty.
         """
         from xarray import Dataset
 
@@ -97,12 +108,12 @@ class TracedBoundary(BoundaryDocument):
 
 
 class StoredRun:
-    """A run in the store of a service; arrays are fetched when they are asked for.
+    """A run in the store of a service. Its arrays are fetched when they are used.
 
     Parameters
     ----------
     summary : RunSummary
-        Everything but the arrays.
+        Everything except the arrays.
     client : Client
     """
 
@@ -117,7 +128,13 @@ class StoredRun:
         return {name: np.array(values, dtype=float) for name, values in document["series"].items()}
 
     def to_xarray(self) -> xarray.Dataset:
-        """Diagnostics over ``time``; positions and tensions of the membranes over ``frame_time``."""
+        """Return the arrays of the run.
+
+        Returns
+        -------
+        Dataset
+            Diagnostics over ``time``; positions and tensions of the membranes over ``frame_time``.
+        """
         from xarray import Dataset
 
         frame_time, membranes = self._frames()
@@ -133,33 +150,33 @@ class StoredRun:
         )
 
     def _frames(self) -> tuple[Array, Array]:
-        """Times of the frames; x, y and tension of all points of each vesicle."""
+        """Return times (frames,), and x, y and tension as (frames, vesicles, 3, points)."""
         vesicles, points = len(self.summary.scene.vesicles), self.summary.work.points
         assert points is not None
-        octets = self._client.get(
+        content = self._client.get(
             f"/runs/{self.summary.key}/frames", headers={"Accept": "application/octet-stream"}
         ).content
-        rows = np.frombuffer(octets, dtype="<f4").reshape(-1, 1 + 3 * vesicles * points).astype(float)
+        rows = np.frombuffer(content, dtype="<f4").reshape(-1, 1 + 3 * vesicles * points).astype(float)
         return rows[:, 0], rows[:, 1:].reshape(-1, vesicles, 3, points)
 
 
 class Client(AbstractContextManager["Client"]):
-    """A service at an address.
+    """A connection to a service.
 
-    Use it as a context manager, or close it.  While the service cannot be reached, as while it is started
-    anew, requests are repeated for a minute; what then is raised is `httpx.TransportError`.
+    Use it as a context manager, or close it. While the service cannot be reached, for example during a
+    restart, requests are repeated for a minute; then `httpx.TransportError` is raised.
 
     Parameters
     ----------
     url : str
-        Such as ``http://127.0.0.1:8000``.
+        Address of the service, for example ``http://127.0.0.1:8000``.
     token : str, optional
-        For a service that asks for one.
+        Bearer token, for a service that requires tokens.
     """
 
     def __init__(self, url: str, token: str | None = None) -> None:
         headers = {} if token is None else {"Authorization": f"Bearer {token}"}
-        self._http = httpx.Client(base_url=url, headers=headers, timeout=SECONDS_TO_ANSWER)
+        self._http = httpx.Client(base_url=url, headers=headers, timeout=TIMEOUT_SECONDS)
 
     def close(self) -> None:
         """Close the connections."""
@@ -169,21 +186,27 @@ class Client(AbstractContextManager["Client"]):
         self.close()
 
     def presets(self) -> list[PresetDocument]:
-        """Studies and scenes that ship with the service, and what they may cost."""
+        """Return the studies and scenes that ship with the service, with the largest cost of each."""
         return [PresetDocument.model_validate(item) for item in self._items("/presets")]
 
     def estimate(self, work: str | Study | Scene, changes: Mapping[str, Any] = {}) -> Estimate:
-        """What a job may cost, without submitting it.
+        """Return an upper bound of the cost of a job without submitting it.
 
         Parameters
         ----------
-        work, changes
-            As `submit` takes them.
+        work : str, Study or Scene
+            Name of a preset, or what to carry out.
+        changes : mapping
+            Values by dotted path, for example ``{"flow.rate": 0.6}``.
+
+        Returns
+        -------
+        Estimate
 
         Raises
         ------
         Refused
-            If they do not describe a job; names the field.
+            If a field is invalid; the message names it.
         """
         answer = self._request("POST", "/estimate", json=_submission(work, changes))
         return Estimate.model_validate_json(answer.content)
@@ -195,23 +218,27 @@ class Client(AbstractContextManager["Client"]):
         ranks: int | None = None,
         seconds: float | None = None,
     ) -> Job:
-        """Submit a job; it is on the service's disk when this returns.
+        """Submit a job. It is on the disk of the service when this returns.
 
         Parameters
         ----------
         work : str, Study or Scene
             Name of a preset, or what to carry out.
         changes : mapping
-            Values by dotted path, such as ``{"flow.rate": 0.6}``.
+            Values by dotted path, for example ``{"flow.rate": 0.6}``.
         ranks : int, optional
-            Processes to use.
+            Number of MPI processes.
         seconds : float, optional
-            How long it may take.
+            Time limit of one attempt, in seconds.
+
+        Returns
+        -------
+        Job
 
         Raises
         ------
         Refused
-            If the service does not accept it; names the field.
+            If the service does not accept the job; the message names the field.
         """
         limits = {
             name: value for name, value in (("ranks", ranks), ("seconds", seconds)) if value is not None
@@ -225,29 +252,63 @@ class Client(AbstractContextManager["Client"]):
         return Job.model_validate_json(answer.content)
 
     def job(self, identifier: str) -> Job:
-        """Where a job stands."""
+        """Return a job in its present state.
+
+        Parameters
+        ----------
+        identifier : str
+            The `id` of the job.
+
+        Returns
+        -------
+        Job
+        """
         return Job.model_validate_json(self.get(f"/jobs/{identifier}").content)
 
     def jobs(self) -> Iterator[Job]:
-        """All jobs, the latest first."""
+        """Return all jobs, the latest first."""
         return map(Job.model_validate, self._items("/jobs"))
 
     def dismiss(self, job: Job) -> Job:
-        """Give a job up, and return it; one that is finished stays as it is."""
+        """Dismiss a job. A finished job stays as it is.
+
+        Parameters
+        ----------
+        job : Job
+
+        Returns
+        -------
+        Job
+            The job in its new state.
+        """
         return Job.model_validate_json(self._request("DELETE", f"/jobs/{job.id}").content)
 
     def log(self, job: Job) -> str:
-        """What the job's processes have said so far."""
+        """Return the log of the processes of a job; of a long log only the end.
+
+        Parameters
+        ----------
+        job : Job
+
+        Returns
+        -------
+        str
+        """
         return self.get(f"/jobs/{job.id}/log").text
 
     def wait(self, job: Job, on_progress: Callable[[Job], None] | None = None) -> Job:
-        """Wait until a job has finished, however it does, and return it.
+        """Wait until a job has succeeded, failed or been dismissed.
 
         Parameters
         ----------
         job : Job
         on_progress : callable, optional
-            Called with the job as it is, and again each time it has changed.
+            Called with the job in its present state and after each change.
+
+        Returns
+        -------
+        Job
+            The finished job.
         """
         for latest in self._listen(job):
             job = latest
@@ -256,68 +317,120 @@ class Client(AbstractContextManager["Client"]):
         return job
 
     def _listen(self, job: Job) -> Iterator[Job]:
-        """The job as it is, and again each time it changes, also across interrupted connections."""
-        while not job.status.finished:
+        """Yield the present state of a job and each new one, also across interrupted connections."""
+        latest = job
+        while not latest.status.finished:
             try:
-                for job in self._events(job):  # noqa: B020  the connection after this one is about the latest
-                    yield job
+                for latest in self._events(job):
+                    yield latest
             except httpx.TransportError:
-                # Waits for the service to come back; the events start anew with the job as it is then.
+                # Wait for the service to return. A new stream of events begins with the state at that time.
                 self.get("/healthz")
 
     def _events(self, job: Job) -> Iterator[Job]:
         with connect_sse(self._http, "GET", f"/jobs/{job.id}/events") as source:
-            _accepted(source.response)
+            _checked(source.response)
             for event in source.iter_sse():
                 yield Job.model_validate_json(event.data)
 
     def boundaries(self) -> Iterator[TracedBoundary]:
-        """All boundaries of the store."""
+        """Return all boundaries of the store."""
         return map(TracedBoundary.model_validate, self._items("/boundaries"))
 
     def boundary(self, key: str) -> TracedBoundary:
-        """The boundary of a study; a job's `key` names it while it is being traced."""
+        """Return the boundary of a study in its present state.
+
+        Parameters
+        ----------
+        key : str
+            Key of the study, which is the `key` of its job. The boundary exists once the job has started.
+
+        Returns
+        -------
+        TracedBoundary
+        """
         return TracedBoundary.model_validate_json(self.get(f"/boundaries/{key}").content)
 
     def critical_value(
         self, key: str, parameters: Mapping[str, float], method: ReadingMethod = ReadingMethod.INTERPOLATED
     ) -> CriticalValueDocument:
-        """Read a critical value off a boundary, with its uncertainty.
+        """Read a critical value from a boundary.
 
         Parameters
         ----------
         key : str
-            Of the boundary.
+            Key of the study.
         parameters : mapping
-            Value of the swept parameter by its dotted path.
+            Value of the swept parameter by its dotted path, for example ``{"flow.rate": 0.6}``.
         method : ReadingMethod
-            Between two points, or of the nearest.
+            Interpolate between two points, or take the nearest point.
+
+        Returns
+        -------
+        CriticalValueDocument
+            The critical value with its uncertainty.
+
+        Raises
+        ------
+        Refused
+            If the value lies outside the points of the boundary.
         """
         answer = self.get(f"/boundaries/{key}/at", params={**parameters, "method": str(method)})
         return CriticalValueDocument.model_validate_json(answer.content)
 
     def runs(self, *where: str) -> Iterator[StoredRun]:
-        """Runs that meet all conditions, such as ``outcome=bound`` or ``flow.rate>=0.5``, newest first."""
+        """Return the runs that meet all conditions, the newest first.
+
+        Parameters
+        ----------
+        *where : str
+            Conditions, for example ``outcome=bound`` or ``flow.rate>=0.5``.
+
+        Returns
+        -------
+        iterator of StoredRun
+        """
         summaries = map(RunSummary.model_validate, self._items("/runs", {"where": list(where)}))
         return (StoredRun(summary, self) for summary in summaries)
 
     def run(self, key: str) -> StoredRun:
-        """One run."""
+        """Return a run.
+
+        Parameters
+        ----------
+        key : str
+            Key of the run, which is the `key` of the job of a scene.
+
+        Returns
+        -------
+        StoredRun
+        """
         return StoredRun(RunSummary.model_validate_json(self.get(f"/runs/{key}").content), self)
 
     def get(self, path: str, **options: Any) -> httpx.Response:
-        """Get a path of the service, with options as `httpx.Client.request` takes them.
+        """Send a GET request.
+
+        Parameters
+        ----------
+        path : str
+            Path, for example ``/runs``.
+        **options
+            Options of `httpx.Client.request`, for example ``params``.
+
+        Returns
+        -------
+        httpx.Response
 
         Raises
         ------
         Refused
-            If the service refuses it.
+            If the service refuses the request.
         """
         return self._request("GET", path, **options)
 
-    @_persistent
+    @_with_retries
     def _request(self, method: str, path: str, **options: Any) -> httpx.Response:
-        return _accepted(self._http.request(method, path, **options))
+        return _checked(self._http.request(method, path, **options))
 
     def _items(self, path: str, parameters: Mapping[str, Any] = {}) -> Iterator[dict[str, Any]]:
         page = self.get(path, params=parameters).json()
@@ -334,7 +447,7 @@ def _submission(work: str | Study | Scene, changes: Mapping[str, Any]) -> dict[s
     return {name: work.model_dump(mode="json"), "set": dict(changes)}
 
 
-def _accepted(response: httpx.Response) -> httpx.Response:
+def _checked(response: httpx.Response) -> httpx.Response:
     if response.is_success:
         return response
     response.read()

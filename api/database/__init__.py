@@ -1,1 +1,1 @@
-"""The database of the service: SQLite in the store, or PostgreSQL by its URL."""
+"""The database of jobs and tokens: SQLite in the store, or PostgreSQL by its URL."""

@@ -12,22 +12,45 @@ from ensemble.timestamp import timestamp_text
 
 
 class Moment(TypeDecorator[datetime]):
-    """A point in time as text, so that every database keeps it whole and orders it as time does."""
+    """A point in time as text in ISO 8601.
+
+    No database rounds it, and the order of the texts is that of the times.
+    """
 
     impl = String(32)
     cache_ok = True
 
     def process_bind_param(self, value: datetime | None, dialect: Dialect) -> str | None:
-        """Write it."""
+        """Return the text of a time; see `TypeDecorator`.
+
+        Parameters
+        ----------
+        value : datetime or None
+        dialect : Dialect
+
+        Returns
+        -------
+        str or None
+        """
         return None if value is None else timestamp_text(value)
 
     def process_result_value(self, value: str | None, dialect: Dialect) -> datetime | None:
-        """Read it."""
+        """Return the time of a text; see `TypeDecorator`.
+
+        Parameters
+        ----------
+        value : str or None
+        dialect : Dialect
+
+        Returns
+        -------
+        datetime or None
+        """
         return None if value is None else datetime.fromisoformat(value)
 
 
 class ServiceTable(DeclarativeBase):
-    """Base of the tables."""
+    """Base class of the tables."""
 
     metadata = MetaData(
         naming_convention={
@@ -42,9 +65,24 @@ class ServiceTable(DeclarativeBase):
 class JobRow(ServiceTable):
     """A job.
 
-    `number` puts jobs in the order of their acceptance; `id` is how others name them.  `fingerprint` is that
-    of the request which brought its idempotency key.  `attempts` is the fencing token of the worker that
-    holds the lease.
+    Most columns are fields of `api.jobs.job.Job`. The others:
+
+    Attributes
+    ----------
+    number : int
+        Orders jobs by their acceptance.
+    document : dict
+        The study or the scene, with all fields.
+    idempotency_key : str or None
+        Key that the client sent with the submission.
+    fingerprint : str
+        Digest of the submission; another one with the same idempotency key is refused.
+    attempts : int
+        Number of attempts so far; the fencing token of the worker that holds the lease.
+    worker : str or None
+        Name of that worker.
+    expires : datetime or None
+        End of the lease.
     """
 
     __tablename__ = "jobs"
@@ -81,7 +119,7 @@ class JobRow(ServiceTable):
 
 
 class TokenRow(ServiceTable):
-    """A bearer token: who holds it, what it allows and until when; of its secret part only a digest."""
+    """A bearer token: its user, scope and lifetime, and a digest of its secret part."""
 
     __tablename__ = "tokens"
 

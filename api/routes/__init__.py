@@ -1,1 +1,1 @@
-"""What the service answers, a module for each resource."""
+"""What the service answers: one module for each resource, and the web page."""

@@ -1,4 +1,4 @@
-"""Runs the steps that a database lacks, on the connection that `api.database.service_database` gives."""
+"""Run the migrations that a database lacks, on the connection of `api.database.service_database`."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from alembic import context
 
 from api.database.database_tables import ServiceTable
 
-# SQLite changes a table by copying it; elsewhere the same steps are plain ALTER statements.
+# SQLite changes a table by copying it. Other databases use ALTER statements for the same migrations.
 context.configure(
     connection=context.config.attributes["connection"],
     target_metadata=ServiceTable.metadata,

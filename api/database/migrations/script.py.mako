@@ -12,10 +12,10 @@ depends_on = None
 
 
 def upgrade() -> None:
-    """Take the step."""
+    """Migrate to this version."""
     ${upgrades if upgrades else "pass"}
 
 
 def downgrade() -> None:
-    """Take it back."""
+    """Migrate back to the version before."""
     ${downgrades if downgrades else "pass"}

@@ -1,4 +1,4 @@
-"""Jobs and tokens."""
+"""Create the tables of jobs and tokens."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ depends_on = None
 
 
 def upgrade() -> None:
-    """Take the step."""
+    """Create the tables."""
     op.create_table(
         "jobs",
         sa.Column("number", sa.Integer(), nullable=False),
@@ -57,6 +57,6 @@ def upgrade() -> None:
 
 
 def downgrade() -> None:
-    """Take it back."""
+    """Remove the tables."""
     op.drop_table("tokens")
     op.drop_table("jobs")
