@@ -13,7 +13,7 @@ from starlette.types import Lifespan
 
 from api.http import problems
 from api.http.middleware import BodyLimits, RequestMetrics, SecurityHeaders
-from api.http.openapi import add_models
+from api.http.openapi import add_models, shorten_descriptions
 from api.jobs.job import NoSuchJob
 from api.jobs.submissions import Submission
 from api.routes import boundaries, jobs, operations, presets, runs
@@ -83,6 +83,7 @@ def create_app(service: Service, lifespan: Lifespan[FastAPI] | None = None) -> F
         app.include_router(router, responses=COMMON_PROBLEMS)
     app.include_router(operations.health_router)
     add_web_page(app)
+    shorten_descriptions(app)
     add_models(app, DESCRIBED_MODELS)
     settings = service.settings
     app.add_middleware(BodyLimits, maximum_bytes=settings.body_bytes, seconds=settings.body_seconds)

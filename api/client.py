@@ -123,7 +123,7 @@ class StoredRun:
 
     @cached_property
     def series(self) -> Mapping[str, Array]:
-        """Diagnostics over time by name; NaN where a value is not finite."""
+        """Time series of the diagnostics by name, NaN where a value is not finite."""
         document = self._client.get(f"/runs/{self.summary.key}/series").json()
         return {name: np.array(values, dtype=float) for name, values in document["series"].items()}
 

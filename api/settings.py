@@ -81,6 +81,10 @@ class Settings(BaseSettings):
 
         It is the one that is set, else the database server that the store has its catalog on, else an SQLite
         file in the store.
+
+        Returns
+        -------
+        str
         """
         if self.database is not None:
             return self.database

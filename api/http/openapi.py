@@ -10,6 +10,7 @@ from pydantic import BaseModel
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaMode, JsonSchemaValue
 from pydantic_core.core_schema import FloatSchema
 
+FIRST_SECTION = "\n\nParameters\n---"  # of a docstring in the numpydoc format
 SCHEMA_REFERENCE = "#/components/schemas/{model}"
 NON_FINITE = ["NaN", "Infinity", "-Infinity"]
 
@@ -57,3 +58,18 @@ def add_models(app: FastAPI, models: Iterable[tuple[type[BaseModel], JsonSchemaM
             mode=mode, schema_generator=_NonFiniteSchema, ref_template=SCHEMA_REFERENCE
         )
         schemas |= schema.pop("$defs", {}) | {model.__name__: schema}
+
+
+def shorten_descriptions(app: FastAPI) -> None:
+    """Describe each route by its docstring, up to the first section.
+
+    The sections are about the Python function. Parameters of the route have their own descriptions.
+
+    Parameters
+    ----------
+    app : FastAPI
+        An application that has all of its routes.
+    """
+    for operations in app.openapi()["paths"].values():
+        for operation in operations.values():
+            operation["description"] = operation["description"].partition(FIRST_SECTION)[0]

@@ -50,7 +50,23 @@ def list_boundaries(
     after: After = None,
     limit: Limit = 100,
 ) -> Response:
-    """List the boundaries that meet all conditions, in the order of their keys."""
+    """List the boundaries that meet all conditions, in the order of their keys.
+
+    Parameters
+    ----------
+    request : Request
+    reader : Caller
+    where : list of str
+        Conditions that all items meet.
+    after : str or None
+        Key of the last item of the previous page.
+    limit : int
+        Largest number of items.
+
+    Returns
+    -------
+    Response
+    """
     records = reader.service.store.boundaries_page(where, after, limit + 1)
     return page_response(
         request, [Record(key, fitted_boundary(recorded)) for key, recorded in records], limit
@@ -61,7 +77,24 @@ def list_boundaries(
     "/{key}", response_model=BoundaryDocument, responses=NOT_MODIFIED | documented(HTTPStatus.NOT_FOUND)
 )
 async def get_boundary(request: Request, reader: Reader, key: StudyKey) -> Response:
-    """Give the present state of a boundary: points, brackets, outcomes, and the line through the points."""
+    """Give the present state of a boundary: points, brackets, outcomes, and the line through the points.
+
+    Parameters
+    ----------
+    request : Request
+    reader : Caller
+    key : str
+        Key of the study.
+
+    Returns
+    -------
+    Response
+
+    Raises
+    ------
+    NotStored
+        If there is no boundary of this key.
+    """
     record = await reader.service.look_up(reader.service.store.boundary_record, key)
     return cached_response(
         request, etag(record.json), REVALIDATE, lambda: json_response(fitted_boundary(record.json))
@@ -77,7 +110,27 @@ def get_critical_value(
         ReadingMethod, Query(description="Interpolate between two points, or take the nearest point.")
     ] = ReadingMethod.INTERPOLATED,
 ) -> CriticalValueDocument:
-    """Read a critical value and its uncertainty from a boundary."""
+    """Read a critical value and its uncertainty from a boundary.
+
+    Parameters
+    ----------
+    request : Request
+    reader : Caller
+    key : str
+        Key of the study.
+    method : ReadingMethod
+
+    Returns
+    -------
+    CriticalValueDocument
+
+    Raises
+    ------
+    NotStored
+        If there is no boundary of this key.
+    BadInput
+        If the value of the swept parameter is missing, is no number or lies outside the boundary.
+    """
     boundary = reader.service.store.boundary(key)
     parameters = {
         name: _number(name, text) for name, text in request.query_params.multi_items() if name != "method"

@@ -68,7 +68,23 @@ JsonBody = Annotated[bytes, Depends(read_json_body)]
 
 @router.post("/estimate", openapi_extra=SUBMISSION_BODY, responses=UNSUPPORTED_MEDIA_TYPE)
 async def estimate_cost(reader: Reader, body: JsonBody) -> Estimate:
-    """Give an upper bound of the cost of a job without submitting it."""
+    """Give an upper bound of the cost of a job without submitting it.
+
+    Parameters
+    ----------
+    reader : Caller
+    body : bytes
+        JSON of a `Submission`.
+
+    Returns
+    -------
+    Estimate
+
+    Raises
+    ------
+    BadInput
+        If a field is invalid; the message names it.
+    """
     return (await reader.service.submissions.read(body)).estimate
 
 
@@ -91,7 +107,26 @@ async def submit_job(
         ),
     ] = None,
 ) -> Response:
-    """Accept a job. It is on disk when this is answered."""
+    """Accept a job. It is on disk when this is answered.
+
+    Parameters
+    ----------
+    submitter : Caller
+    body : bytes
+        JSON of a `Submission`.
+    idempotency_key : str or None
+
+    Returns
+    -------
+    Response
+
+    Raises
+    ------
+    BadInput
+        If a field is invalid; the message names it.
+    Problem
+        If the job is too large, or its owner has too many unfinished jobs.
+    """
     service = submitter.service
     asked = await service.submissions.read(body)
     ranks, seconds = _resources(service.settings, asked)
@@ -142,7 +177,30 @@ async def list_jobs(
     ] = None,
     limit: Limit = 100,
 ) -> Response:
-    """List the jobs, the latest first."""
+    """List the jobs, the latest first.
+
+    Parameters
+    ----------
+    request : Request
+    reader : Caller
+    owner : str or None
+        Only jobs of this user.
+    status : JobStatus or None
+        Only jobs of this status.
+    after : str or None
+        Identifier of the last job of the previous page.
+    limit : int
+        Largest number of jobs.
+
+    Returns
+    -------
+    Response
+
+    Raises
+    ------
+    BadInput
+        If there is no job `after`.
+    """
     service = reader.service
     try:
         records = await service.look_up(service.jobs.records.page, limit + 1, after, owner, status)
@@ -153,14 +211,46 @@ async def list_jobs(
 
 @router.get("/jobs/{identifier}", response_model=Job, responses=NO_SUCH_JOB)
 async def get_job(reader: Reader, identifier: JobKey) -> Response:
-    """Give a job with its status and progress."""
+    """Give a job with its status and progress.
+
+    Parameters
+    ----------
+    reader : Caller
+    identifier : str
+
+    Returns
+    -------
+    Response
+
+    Raises
+    ------
+    NoSuchJob
+        If there is no such job.
+    """
     record = await reader.service.look_up(reader.service.jobs.records.one, identifier)
     return json_response(record.json)
 
 
 @router.delete("/jobs/{identifier}", responses=NO_SUCH_JOB)
 def dismiss_job(submitter: Submitter, identifier: JobKey) -> Job:
-    """Dismiss a job: its processes end within seconds. A finished job stays as it is."""
+    """Dismiss a job: its processes end within seconds. A finished job stays as it is.
+
+    Parameters
+    ----------
+    submitter : Caller
+    identifier : str
+
+    Returns
+    -------
+    Job
+
+    Raises
+    ------
+    NoSuchJob
+        If there is no such job.
+    Problem
+        If the caller is neither the owner nor an administrator.
+    """
     owner = submitter.service.jobs.get(identifier).owner
     if submitter.user != owner and not submitter.scope.includes(TokenScope.ADMIN):
         raise Problem(HTTPStatus.FORBIDDEN, "Authorization: only its owner or an admin may dismiss a job")
@@ -173,7 +263,22 @@ def dismiss_job(submitter: Submitter, identifier: JobKey) -> Job:
     responses=NO_SUCH_JOB | EVENT_STREAM,
 )
 async def watch_job(reader: Reader, identifier: JobKey) -> EventSourceResponse:
-    """Send the present state of the job, and the new one after each change, until the job has finished."""
+    """Send the present state of the job, and the new one after each change, until the job has finished.
+
+    Parameters
+    ----------
+    reader : Caller
+    identifier : str
+
+    Returns
+    -------
+    EventSourceResponse
+
+    Raises
+    ------
+    NoSuchJob
+        If there is no such job.
+    """
     record = await reader.service.look_up(reader.service.jobs.records.one, identifier)
     return EventSourceResponse(_events(reader.service, record))
 
@@ -200,7 +305,22 @@ async def _watched_job(service: Service, identifier: str) -> Record:
 
 @router.get("/jobs/{identifier}/log", response_class=PlainTextResponse, responses=NO_SUCH_JOB)
 def get_log(reader: Reader, identifier: JobKey) -> Response:
-    """Give the log of the job's processes; of a long log only the end."""
+    """Give the log of the job's processes; of a long log only the end.
+
+    Parameters
+    ----------
+    reader : Caller
+    identifier : str
+
+    Returns
+    -------
+    Response
+
+    Raises
+    ------
+    NoSuchJob
+        If there is no such job.
+    """
     jobs = reader.service.jobs
     return PlainTextResponse(_end_of_log(jobs.log_path(jobs.get(identifier))))
 

@@ -39,7 +39,12 @@ class JobMetrics(Collector):
         self._jobs = jobs
 
     def collect(self) -> Iterator[Metric]:
-        """Yield the number of jobs of each status."""
+        """Read the number of jobs of each status.
+
+        Yields
+        ------
+        Metric
+        """
         (family,) = self.describe()
         for status, count in self._jobs.counts().items():
             family.add_metric((status,), count)
@@ -58,7 +63,21 @@ async def check_alive() -> Health:
 
 @health_router.get("/readyz", responses=documented(HTTPStatus.SERVICE_UNAVAILABLE))
 def check_ready(request: Request) -> Health:
-    """Answer with 200 if the store and the database of jobs can be read, else with 503."""
+    """Answer with 200 if the store and the database of jobs can be read, else with 503.
+
+    Parameters
+    ----------
+    request : Request
+
+    Returns
+    -------
+    Health
+
+    Raises
+    ------
+    Problem
+        If either cannot be read.
+    """
     service = service_of(request)
     try:
         service.jobs.counts()
@@ -70,6 +89,16 @@ def check_ready(request: Request) -> Health:
 
 @metrics_router.get("/metrics", response_class=PlainTextResponse)
 def get_metrics(request: Request, reader: Reader) -> Response:
-    """Give metrics in the text format of Prometheus: requests, their times, and jobs by status."""
+    """Give metrics in the text format of Prometheus: requests, their times, and jobs by status.
+
+    Parameters
+    ----------
+    request : Request
+    reader : Caller
+
+    Returns
+    -------
+    Response
+    """
     registry: CollectorRegistry = request.app.state.registry
     return Response(generate_latest(registry), media_type=CONTENT_TYPE_LATEST)

@@ -18,7 +18,16 @@ router = APIRouter(prefix="/presets", tags=["presets"])
 
 @router.get("")
 def list_presets(reader: Reader) -> CollectionPage[PresetDocument]:
-    """List the presets, with all fields and with the largest cost of each."""
+    """List the presets, with all fields and with the largest cost of each.
+
+    Parameters
+    ----------
+    reader : Caller
+
+    Returns
+    -------
+    CollectionPage
+    """
     maximum_cost = reader.service.settings.maximum_cost
     return CollectionPage(items=[_preset(name, maximum_cost) for name in preset_names()], next=None)
 

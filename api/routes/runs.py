@@ -47,13 +47,45 @@ def list_runs(
     after: After = None,
     limit: Limit = 100,
 ) -> Response:
-    """List the runs that meet all conditions, the newest first."""
+    """List the runs that meet all conditions, the newest first.
+
+    Parameters
+    ----------
+    request : Request
+    reader : Caller
+    where : list of str
+        Conditions that all items meet.
+    after : str or None
+        Key of the last item of the previous page.
+    limit : int
+        Largest number of items.
+
+    Returns
+    -------
+    Response
+    """
     return page_response(request, reader.service.store.runs_page(where, after, limit + 1), limit)
 
 
 @router.get("/{key}", response_model=RunSummary, responses=RUN_RESPONSES)
 async def get_run(request: Request, reader: Reader, key: RunKey) -> Response:
-    """Give everything about a run except its arrays."""
+    """Give everything about a run except its arrays.
+
+    Parameters
+    ----------
+    request : Request
+    reader : Caller
+    key : str
+
+    Returns
+    -------
+    Response
+
+    Raises
+    ------
+    NotStored
+        If there is no run of this key.
+    """
     record = await reader.service.look_up(reader.service.store.run_record, key)
     return cached_response(request, etag(key), IMMUTABLE, lambda: json_response(record.json))
 
@@ -67,7 +99,25 @@ def get_series(
         list[str], Query(max_length=50, description="Names of diagnostics; without any, all are given.")
     ] = [],  # noqa: B006
 ) -> Response:
-    """Give the diagnostics of a run over time."""
+    """Give the diagnostics of a run over time.
+
+    Parameters
+    ----------
+    request : Request
+    reader : Caller
+    key : str
+    name : list of str
+        Names of diagnostics; all if it is empty.
+
+    Returns
+    -------
+    Response
+
+    Raises
+    ------
+    NotStored
+        If there is no run of this key.
+    """
 
     def make() -> Response:
         return json_response(series_document(reader.service.store.load(key), name))
@@ -86,7 +136,25 @@ def get_frames(
     ] = MAXIMUM_FRAME,
     stride: Annotated[int, Query(ge=1, le=MAXIMUM_FRAME, description="Step from frame to frame.")] = 1,
 ) -> Response:
-    """Give the recorded states of a run."""
+    """Give the recorded states of a run.
+
+    Parameters
+    ----------
+    request : Request
+    reader : Caller
+    key : str
+    start, stop, stride : int
+        Numbers of the frames, as in `range`.
+
+    Returns
+    -------
+    Response
+
+    Raises
+    ------
+    NotStored
+        If there is no run of this key.
+    """
     is_binary = BINARY in request.headers.get("accept", "")
 
     def make() -> Response:

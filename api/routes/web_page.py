@@ -28,6 +28,9 @@ CONTENT_SECURITY_POLICY = "; ".join(
 )
 
 
+WEB_PAGE_HEADERS = {"Content-Security-Policy": CONTENT_SECURITY_POLICY, "Cache-Control": "no-cache"}
+
+
 def add_web_page(app: FastAPI) -> None:
     """Serve the page at ``/`` and its files below ``/assets``.
 
@@ -35,11 +38,9 @@ def add_web_page(app: FastAPI) -> None:
     ----------
     app : FastAPI
     """
-    headers = {"Content-Security-Policy": CONTENT_SECURITY_POLICY, "Cache-Control": "no-cache"}
-
-    @app.get("/", include_in_schema=False)
-    async def get_web_page() -> FileResponse:
-        """Answer with the page."""
-        return FileResponse(STATIC / "index.html", headers=headers)
-
+    app.add_api_route("/", _get_web_page, include_in_schema=False)
     app.mount("/assets", GZipMiddleware(StaticFiles(directory=STATIC)))
+
+
+async def _get_web_page() -> FileResponse:
+    return FileResponse(STATIC / "index.html", headers=WEB_PAGE_HEADERS)

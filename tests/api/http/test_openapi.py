@@ -59,6 +59,14 @@ def test_every_error_is_described_as_a_problem(paths):
                     assert list(response["content"]) == ["application/problem+json"], (path, method, status)
 
 
+def test_descriptions_are_for_readers_of_the_api(paths):
+    """The sections of the docstrings are about Python and stay there."""
+    for path, methods in paths.items():
+        for method, operation in methods.items():
+            assert operation["description"], (path, method)
+            assert "---" not in operation["description"], (path, method)
+
+
 segments = st.sampled_from(sorted({*RUN_FIELDS, *BOUNDARY_FIELDS, "flow", "rate", "0", "kind", "study", "x"}))
 conditions = st.builds(
     "{}{}{}".format,
