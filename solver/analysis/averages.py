@@ -94,7 +94,7 @@ def viscosity(
 def _averaged_over(
     scene: Scene, series: Series, tracker: RevolutionTracker | None
 ) -> tuple[float, float] | None:
-    """Return the interval over which the viscosity of a run that is not steady is averaged, if there is one."""
+    """Return the interval over which the viscosity of an unsteady run is averaged, if there is one."""
     if tracker:
         return (tracker.half_turns[-3], tracker.half_turns[-1]) if tracker.period else None
     if len(scene.vesicles) == 1 or len(series["time"]) < 2:
