@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from ensemble.config.study import Study
     from ensemble.mpi.run_study import StudyResult
     from ensemble.mpi.usage import RunUsage
-    from ensemble.report.files import Report
+    from ensemble.report.report_files import FinishedReport
     from ensemble.search.boundary import Boundary
     from ensemble.store import Store
 
@@ -334,7 +334,7 @@ def report(
         print(made.directory)
 
 
-def _paper(only: list[str], quick: bool, store: Path, ranks_per_run: str | None) -> Report | None:
+def _paper(only: list[str], quick: bool, store: Path, ranks_per_run: str | None) -> FinishedReport | None:
     """Make the paper's report on all ranks; None on all but the first."""
     from rich.console import Console
 
@@ -342,12 +342,12 @@ def _paper(only: list[str], quick: bool, store: Path, ranks_per_run: str | None)
     from ensemble.mpi.groups import chosen_ranks
     from ensemble.mpi.world import abort_guard, on_root, world
     from ensemble.report.paper.make_paper import make_paper
-    from ensemble.report.paper.sections import chosen
+    from ensemble.report.paper.sections import sections_named
     from ensemble.report.report_progress import report_progress
     from ensemble.store import Store
 
     with refusing():
-        sections = chosen(only)
+        sections = sections_named(only)
     communicator = world()
     with abort_guard(communicator):
         # Its scenes have one vesicle or two.
@@ -357,7 +357,7 @@ def _paper(only: list[str], quick: bool, store: Path, ranks_per_run: str | None)
             return make_paper(communicator, opened, sections, quick, tell, ranks)
 
 
-def _scaling(quick: bool, store: Path) -> Report | None:
+def _scaling(quick: bool, store: Path) -> FinishedReport | None:
     """Make the report on scaling on all ranks; None on all but the first."""
     from rich.console import Console
 
@@ -378,19 +378,21 @@ def _create(store: Path) -> None:
         _opened(store).close()
 
 
-def _measurements(name: ReportName, quick: bool, store: Path) -> Report | None:
+def _measurements(name: ReportName, quick: bool, store: Path) -> FinishedReport | None:
     """Measure the solver on the first rank alone: nothing else may disturb the time that runs take."""
     if launched_rank() != 0:
         return None
     from rich.console import Console
 
-    from ensemble.report.make_report import make_report
     from ensemble.report.report_progress import report_progress
+    from ensemble.report.stability.make_stability import make_stability
+    from ensemble.report.work_precision.make_work_precision import make_work_precision
 
     with ExitStack() as stack:
         with refusing():
             opened = stack.enter_context(_opened(store))
-        return make_report(name, opened, quick, stack.enter_context(report_progress(Console(stderr=True))))
+        make = make_stability if name is ReportName.STABILITY else make_work_precision
+        return make(opened, quick, stack.enter_context(report_progress(Console(stderr=True))))
 
 
 @app.command()

@@ -9,8 +9,9 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from ensemble.figures.membranes import choose_snapshots, draw_membranes, extension
+from ensemble.figures.membranes import add_tension_bar, extended_ends
 from ensemble.figures.panels import PANELS
+from ensemble.figures.snapshots import choose_snapshots, draw_snapshots
 from ensemble.figures.style import GRAY, STYLE, WIDTH
 from ensemble.figures.symbols import describe
 from solver.analysis.contacts import CONTACT
@@ -53,22 +54,12 @@ def run_figure(run: Run) -> Figure:
     grid = figure.add_gridspec(2, 1)
     strip = figure.add_subplot(grid[0], label="membranes")
     clusters = _clusters(run)
-    membranes = draw_membranes(strip, run.scene, run.frames, clusters)
+    membranes = draw_snapshots(strip, run.scene, run.frames, clusters)
     if clusters is not None:
         strip.annotate(
             _CLUSTERS, (0, 0), (0, -2), "axes fraction", "offset points", va="top", fontsize="small"
         )
-    bar = figure.colorbar(
-        membranes,
-        ax=strip,
-        location="bottom",
-        extend=extension(membranes),
-        shrink=0.5,
-        aspect=40,
-        pad=0.05,
-    )
-    bar.ax.set_label("tension")
-    bar.set_label(r"tension $\sigma$")
+    add_tension_bar(figure, membranes, strip, extended_ends(membranes))
 
     cells = grid[1].subgridspec(rows, columns)
     for position, (name, draw) in enumerate(panels.items()):

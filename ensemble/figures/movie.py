@@ -13,16 +13,24 @@ from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotSpec
 from matplotlib.quiver import Quiver
 from scipy.interpolate import Akima1DInterpolator
 
 from ensemble.disk import replacing
-from ensemble.figures.membranes import FEW, extension, finite_frames, membrane_segments, tension_scale
+from ensemble.figures.membranes import (
+    FEW,
+    add_tension_bar,
+    extended_ends,
+    membrane_lines,
+    membrane_segments,
+    tension_scale,
+)
 from ensemble.figures.panels import PANELS
-from ensemble.figures.style import GRAY, INSIDE, STYLE, TENSION_COLORS, VERMILLION
+from ensemble.figures.snapshots import finite_frames
+from ensemble.figures.style import GRAY, INSIDE, STYLE, VERMILLION
 from ensemble.figures.symbols import describe
 from solver.analysis.run import Array, Frames, Run
 from solver.flows import ImposedFlow
@@ -175,26 +183,12 @@ class Picture:
         axes.set_axis_off()
         self._time = axes.text(0.0, 1.0, "", transform=axes.transAxes, va="top")
         self._inside = PolyCollection([], facecolor=INSIDE)
-        self.membranes = LineCollection(
-            [],
-            cmap=TENSION_COLORS,
-            norm=tension_scale(tension),
-            linewidths=2.0 if len(self._scene.vesicles) <= FEW else 1.0,
-            capstyle="round",
-        )
+        # All tensions of the run for now: the bar shows whether its scale holds them.
+        width = 2.0 if len(self._scene.vesicles) <= FEW else 1.0
+        self.membranes = membrane_lines(np.empty((0, 2, 2)), tension, tension_scale(tension), width)
         axes.add_collection(self._inside, autolim=False)
         axes.add_collection(self.membranes, autolim=False)
-        self.membranes.set_array(tension.ravel())  # of all frames: the bar says whether its scale holds them
-        bar = self.figure.colorbar(
-            self.membranes,
-            ax=axes,
-            location="bottom",
-            extend=extension(self.membranes),
-            shrink=0.6,
-            aspect=40,
-        )
-        bar.ax.set_label("tension")
-        bar.set_label(r"tension $\sigma$")
+        add_tension_bar(self.figure, self.membranes, axes, extended_ends(self.membranes), shrink=0.6)
         return axes
 
     def _freeze(self, moving: Collection[Artist]) -> None:

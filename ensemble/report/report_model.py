@@ -1,11 +1,60 @@
-"""What reports are made of: immutable models that are strictly valid JSON, so without NaN or infinity."""
+"""What all reports share: the base of their data, and the description of the computer that made them."""
 
 from __future__ import annotations
 
+import platform
+from importlib.metadata import version
+from pathlib import Path
+
 from pydantic import BaseModel, ConfigDict
 
+from ensemble.store.run_record import RESULT_PACKAGES
 
-class Document(BaseModel):
-    """Base of everything in a report."""
+
+class ReportModel(BaseModel):
+    """Base of everything in a report: immutable, and strictly valid JSON, so without NaN or infinity."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class Machine(ReportModel):
+    """The computer and the versions behind the numbers of a report.
+
+    Attributes
+    ----------
+    processor : str
+        Model of the processor.
+    system : str
+        Operating system and architecture.
+    versions : dict of str to str
+        Version of each package that numbers depend on, and of Python.
+    """
+
+    processor: str
+    system: str
+    versions: dict[str, str]
+
+    @classmethod
+    def here(cls) -> Machine:
+        """Describe this computer."""
+        versions = {package: version(package) for package in RESULT_PACKAGES}
+        return cls(
+            processor=_processor(),
+            system=f"{platform.system()} {platform.machine()}",
+            versions=versions | {"python": platform.python_version()},
+        )
+
+    def sentence(self) -> str:
+        """Return the description as one line of text."""
+        packages = ", ".join(f"{name} {number}" for name, number in self.versions.items())
+        return f"{self.processor}, {self.system}; {packages}"
+
+
+def _processor() -> str:
+    """Return the model of the processor, which Linux only tells in a file."""
+    information = Path("/proc/cpuinfo")
+    if information.is_file():
+        for line in information.read_text().splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.processor() or platform.machine()

@@ -16,20 +16,52 @@ from solver.scene import Scene
 
 
 @dataclass(frozen=True)
-class _Varied:
-    """A preset with changes, given as ``path=value`` exactly as the command line takes them."""
+class _PresetWithChanges:
+    """A preset with changes.
+
+    Attributes
+    ----------
+    preset : str
+        Name of the preset.
+    changes : tuple of str
+        Changes as ``path=value``, exactly as the command line takes them.
+    """
 
     preset: str
     changes: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, preset: str, changes: Mapping[str, Any] | None = None) -> Self:
-        """Name a preset and the values at some of its dotted paths."""
-        return cls(preset, _texts(changes or {}))
+        """Return a preset with changes.
 
-    def but(self, changes: Mapping[str, Any]) -> Self:
-        """Return this with further changes."""
-        return type(self)(self.preset, (*self.changes, *_texts(changes)))
+        Parameters
+        ----------
+        preset : str
+            Name of the preset.
+        changes : mapping of str to any, optional
+            Values by their dotted path.
+
+        Returns
+        -------
+        Case or StudyCase
+            The preset with these changes.
+        """
+        return cls(preset, _overrides(changes or {}))
+
+    def with_changes(self, changes: Mapping[str, Any]) -> Self:
+        """Return the same preset with further changes.
+
+        Parameters
+        ----------
+        changes : mapping of str to any
+            Values by their dotted path.
+
+        Returns
+        -------
+        Case or StudyCase
+            The preset with all changes; later ones replace earlier ones.
+        """
+        return type(self)(self.preset, (*self.changes, *_overrides(changes)))
 
     def _command(self, verb: str) -> str:
         options = [part for change in self.changes for part in ("--set", change)]
@@ -37,12 +69,12 @@ class _Varied:
 
 
 @dataclass(frozen=True)
-class Case(_Varied):
+class Case(_PresetWithChanges):
     """One run: a preset scene with changes."""
 
     @cached_property
     def scene(self) -> Scene:
-        """The scene; `ValueError` names a field that does not allow its change."""
+        """The scene; raises `ValueError` with the name of a field that does not allow its change."""
         return load_scene(self.preset, self.changes)
 
     @cached_property
@@ -52,25 +84,25 @@ class Case(_Varied):
 
     @property
     def command(self) -> str:
-        """What makes this very run, with the same key, by itself."""
+        """Command that makes this very run, with the same key."""
         return self._command("run")
 
 
 @dataclass(frozen=True)
-class StudyCase(_Varied):
+class StudyCase(_PresetWithChanges):
     """One boundary: a preset study with changes."""
 
     @cached_property
     def study(self) -> Study:
-        """The study; `ValueError` names a field that does not allow its change."""
+        """The study; raises `ValueError` with the name of a field that does not allow its change."""
         return load_study(self.preset, self.changes)
 
     @property
     def command(self) -> str:
-        """What traces this very boundary by itself."""
+        """Command that traces this very boundary."""
         return self._command("bisect")
 
 
-def _texts(changes: Mapping[str, Any]) -> tuple[str, ...]:
-    # Numbers, strings and arrays of them are the same in JSON and in TOML.
+def _overrides(changes: Mapping[str, Any]) -> tuple[str, ...]:
+    # Numbers, strings and arrays of them are written the same in JSON and in TOML.
     return tuple(f"{path}={json.dumps(value)}" for path, value in changes.items())

@@ -2,28 +2,105 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from typing import Any
 
 from pydantic import Field
 
 from ensemble.report.paper.case import Case, StudyCase
-from ensemble.report.report_model import Document
+from ensemble.report.report_model import ReportModel
 
-Value = float | tuple[float, float] | str | None
-Bracket = tuple[float, float]
+Interval = tuple[float, float]
+Value = float | Interval | str | None
 
 PERCENT = "%"
 
 
-class Row(Document):
-    """One line of a comparison.
+@cache
+def published() -> dict[str, Any]:
+    """Return the tables of ``published.toml``, which states the source of every value."""
+    data = files("ensemble.report.paper") / "published.toml"
+    return tomllib.loads(data.read_text(encoding="utf-8"))
 
-    deviation : in `unit`; of brackets, the distance between them, 0 where they overlap.  None where one of
-        the two is not known or they are words.
-    allowed : largest deviation that counts as agreement; None where nothing was promised.
-    agrees : whether it is kept; None without a promise.
-    runs : keys of the runs behind the computed value.
-    command : what computes it by itself.
+
+@dataclass(frozen=True)
+class Evidence:
+    """What a computed value rests on.
+
+    Attributes
+    ----------
+    runs : tuple of str
+        Keys of the runs.
+    command : str
+        Command that computes the value; empty if there is no single one.
+    """
+
+    runs: tuple[str, ...] = ()
+    command: str = ""
+
+
+def runs_of(*cases: Case) -> Evidence:
+    """Return the evidence that consists of the runs of some cases.
+
+    Parameters
+    ----------
+    *cases : Case
+        The cases.
+
+    Returns
+    -------
+    Evidence
+        Their keys and commands.
+    """
+    return Evidence(tuple(case.key for case in cases), "; ".join(case.command for case in cases))
+
+
+def study_runs(study: StudyCase, runs: Sequence[str] = ()) -> Evidence:
+    """Return the evidence that a study provides.
+
+    Parameters
+    ----------
+    study : StudyCase
+        The study.
+    runs : sequence of str
+        Keys of those of its runs on which the value rests.
+
+    Returns
+    -------
+    Evidence
+        The keys and the command of the study.
+    """
+    return Evidence(tuple(runs), study.command)
+
+
+class Comparison(ReportModel):
+    """A published value beside the computed one.
+
+    Attributes
+    ----------
+    quantity : str
+        What is compared.
+    published, computed : float, (float, float), str or None
+        The values: numbers, intervals, or words.  None where the value is not known.
+    deviation : float or None
+        Deviation of the computed value, in `unit`; of intervals, the distance between them, 0 where they
+        overlap.  None where one of the two is not known, or for words.
+    unit : str
+        Unit of `deviation` and `allowed`.
+    allowed : float or None
+        Largest deviation that counts as agreement; None where no agreement is promised.
+    agrees : bool or None
+        Whether the deviation is allowed; None where no agreement is promised.
+    note : str
+        A remark.
+    runs : list of str
+        Keys of the runs on which the computed value rests.
+    command : str
+        Command that computes the value.
     """
 
     quantity: str
@@ -38,52 +115,86 @@ class Row(Document):
     command: str = ""
 
 
-def number(
+def compare_numbers(
     quantity: str,
     published: float | None,
     computed: float | None,
-    behind: Sequence[Case] | StudyCase = (),
+    evidence: Evidence = Evidence(),
     *,
     allowed: float | None = None,
     unit: str = PERCENT,
-    runs: Sequence[str] = (),
     note: str = "",
-) -> Row:
-    """Compare two numbers: relatively, in percent, or by their difference in another unit.
+) -> Comparison:
+    """Compare two numbers, by their relative difference in percent or by their difference in another unit.
 
     Parameters
     ----------
     quantity : str
+        What is compared.
     published, computed : float or None
-    behind : sequence of Case, or StudyCase
-        What the computed number was read off.
+        The numbers; None where one is not known.
+    evidence : Evidence
+        What the computed number rests on.
     allowed : float, optional
-        Largest deviation, in `unit`.
+        Largest deviation that counts as agreement, in `unit`.
     unit : str
-        ``"%"``, else the unit of both numbers, such as ``"°"``.
-    runs : sequence of str
-        Keys of the runs behind it, if they are not those of the cases.
+        ``"%"``, or the unit of both numbers, such as ``"°"``.
     note : str
+        A remark.
+
+    Returns
+    -------
+    Comparison
+        The comparison.
     """
     deviation = None
     if published is not None and computed is not None:
         deviation = 100 * (computed / published - 1) if unit == PERCENT else computed - published
-    return _row(quantity, published, computed, deviation, behind, allowed, unit, runs, note)
+    return Comparison(
+        quantity=quantity,
+        published=published,
+        computed=computed,
+        deviation=deviation,
+        unit=unit,
+        allowed=allowed,
+        agrees=_agree(deviation, allowed),
+        note=note,
+        runs=list(evidence.runs),
+        command=evidence.command,
+    )
 
 
-def bracket(
+def compare_intervals(
     quantity: str,
-    published: Bracket | None,
-    computed: Bracket | None,
-    behind: Sequence[Case] | StudyCase = (),
+    published: Interval | None,
+    computed: Interval | None,
+    evidence: Evidence = Evidence(),
     *,
     allowed: float | None = None,
-    runs: Sequence[str] = (),
     note: str = "",
-) -> Row:
-    """Compare two brackets: 0 where they overlap, else their distance in percent of the published end.
+) -> Comparison:
+    """Compare two brackets of a critical value.
 
-    The distance is negative where the computed bracket lies below.  Parameters as for `number`.
+    The deviation is 0 where they overlap, else the distance between them in percent of the published end.
+    It is negative where the computed bracket lies below the published one.
+
+    Parameters
+    ----------
+    quantity : str
+        What is compared.
+    published, computed : (float, float) or None
+        The brackets, low end first; None where one is not known.
+    evidence : Evidence
+        What the computed bracket rests on.
+    allowed : float, optional
+        Largest deviation that counts as agreement, in percent.
+    note : str
+        A remark.
+
+    Returns
+    -------
+    Comparison
+        The comparison.
     """
     deviation = None
     if published is not None and computed is not None:
@@ -92,47 +203,56 @@ def bracket(
             deviation = 100 * (computed[0] / published[1] - 1)
         elif computed[1] < published[0]:
             deviation = 100 * (computed[1] / published[0] - 1)
-    return _row(quantity, published, computed, deviation, behind, allowed, PERCENT, runs, note)
-
-
-def words(
-    quantity: str,
-    published: str | None,
-    computed: str | None,
-    behind: Sequence[Case] | StudyCase = (),
-    *,
-    runs: Sequence[str] = (),
-    note: str = "",
-) -> Row:
-    """Compare what happens, in words: they agree where they are the same."""
-    row = _row(quantity, published, computed, None, behind, None, "", runs, note)
-    same = None if published is None or computed is None else published == computed
-    return row.model_copy(update={"agrees": same})
-
-
-def _row(
-    quantity: str,
-    published: Value,
-    computed: Value,
-    deviation: float | None,
-    behind: Sequence[Case] | StudyCase,
-    allowed: float | None,
-    unit: str,
-    runs: Sequence[str],
-    note: str,
-) -> Row:
-    cases = () if isinstance(behind, StudyCase) else behind
-    commands = [behind.command] if isinstance(behind, StudyCase) else [case.command for case in cases]
-    agrees = None if allowed is None or deviation is None else abs(deviation) <= allowed
-    return Row(
+    return Comparison(
         quantity=quantity,
         published=published,
         computed=computed,
         deviation=deviation,
-        unit=unit,
         allowed=allowed,
-        agrees=agrees,
+        agrees=_agree(deviation, allowed),
         note=note,
-        runs=list(runs) or [case.key for case in cases],
-        command="; ".join(commands),
+        runs=list(evidence.runs),
+        command=evidence.command,
     )
+
+
+def compare_words(
+    quantity: str,
+    published: str | None,
+    computed: str | None,
+    evidence: Evidence = Evidence(),
+    *,
+    note: str = "",
+) -> Comparison:
+    """Compare what happens, in words: they agree if they are the same.
+
+    Parameters
+    ----------
+    quantity : str
+        What is compared.
+    published, computed : str or None
+        The words; None where one is not known.
+    evidence : Evidence
+        What the computed words rest on.
+    note : str
+        A remark.
+
+    Returns
+    -------
+    Comparison
+        The comparison; its unit is empty.
+    """
+    return Comparison(
+        quantity=quantity,
+        published=published,
+        computed=computed,
+        unit="",
+        agrees=None if published is None or computed is None else published == computed,
+        note=note,
+        runs=list(evidence.runs),
+        command=evidence.command,
+    )
+
+
+def _agree(deviation: float | None, allowed: float | None) -> bool | None:
+    return None if allowed is None or deviation is None else abs(deviation) <= allowed

@@ -1,4 +1,4 @@
-"""Makes the report on all ranks and writes it into the store."""
+"""Makes the report on the paper on all ranks and writes it into the store."""
 
 from __future__ import annotations
 
@@ -6,17 +6,18 @@ import time
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from matplotlib.figure import Figure as Drawn
+from matplotlib.figure import Figure
 
 from ensemble.cli.progress import progress_text
 from ensemble.mpi.run_study import Snapshot, run_batch, run_study
 from ensemble.report import ReportName
-from ensemble.report.files import Report, report_directory, write_report
-from ensemble.report.machine import Machine
-from ensemble.report.paper.paper_document import Figure, Paper, Part
+from ensemble.report.paper.comparison import Comparison
+from ensemble.report.paper.paper_document import Paper, PaperSection, ReportFigure
 from ensemble.report.paper.paper_text import paper_page, paper_text
 from ensemble.report.paper.results import Results
-from ensemble.report.paper.section import Chapter, Drawing, Section, SectionPlan
+from ensemble.report.paper.section import Section, SectionContent, SectionFigure, SectionPlan
+from ensemble.report.report_files import FinishedReport, report_directory, write_report
+from ensemble.report.report_model import Machine
 from ensemble.report.report_progress import Tell
 from ensemble.store import Store
 
@@ -29,9 +30,9 @@ def make_paper(
     store: Store,
     sections: Sequence[Section],
     quick: bool,
-    tell: Tell,
+    log: Tell,
     ranks_per_run: int = 1,
-) -> Report | None:
+) -> FinishedReport | None:
     """Make the runs that the store does not have, then write ``reports/paper/`` in the store.
 
     Collective.  The files are ``report.md``, ``report.html``, ``report.json`` and the figures, as PNG and as
@@ -40,33 +41,35 @@ def make_paper(
     Parameters
     ----------
     communicator : Intracomm
+        All ranks.
     store : Store
         The same on every rank.
     sections : sequence of Section
+        The sections to make.
     quick : bool
-        Minutes instead of an hour.
-    tell : callable
-        Takes a line about every run that has been made, on rank 0.
+        Make fewer runs: minutes instead of an hour.
+    log : callable
+        Called on rank 0 with one line of text whenever a run has been made.
     ranks_per_run : int
         How many ranks compute a run together.
 
     Returns
     -------
-    Report
-        On rank 0; None elsewhere.
+    FinishedReport or None
+        The report on rank 0; None elsewhere.
     """
     begin, runs = time.perf_counter(), 0
-    courses = _Courses(sections, Results(store), quick) if communicator.Get_rank() == 0 else None
-    while (plan := communicator.bcast(courses.next_plan() if courses else None)) is not None:
-        runs += _carry_out(communicator, plan, store, tell, ranks_per_run)
-    if courses is None:
+    generators = _SectionGenerators(sections, Results(store), quick) if communicator.Get_rank() == 0 else None
+    while (plan := communicator.bcast(generators.next_plan() if generators else None)) is not None:
+        runs += _make_runs(communicator, plan, store, log, ranks_per_run)
+    if generators is None:
         return None
-    parts: list[Part] = []
-    figures: dict[str, Drawn] = {}
+    parts: list[PaperSection] = []
+    figures: dict[str, Figure] = {}
     for section in sections:
-        part, drawn = _part(section, courses.chapters[section.name])
+        part, section_figures = _part(section, generators.contents[section.name])
         parts.append(part)
-        figures |= drawn
+        figures |= section_figures
     paper = Paper(
         quick=quick,
         machine=Machine.here(),
@@ -75,78 +78,81 @@ def make_paper(
         wall_seconds=time.perf_counter() - begin,
         parts=parts,
     )
-    report = Report(report_directory(store, ReportName.PAPER), paper, paper_text(paper))
+    report = FinishedReport(report_directory(store, ReportName.PAPER), paper, paper_text(paper))
     write_report(report, figures, {"report.html": paper_page(paper)})
     return report
 
 
-class _Courses:
-    """All sections on their way to their chapters, on rank 0.
+class _SectionGenerators:
+    """Takes the generators of all sections, on rank 0, from their first plan to their content.
 
     Attributes
     ----------
-    chapters : dict
-        Those that are finished, by the section's name.
+    contents : dict of str to SectionContent
+        The content of each section that is finished, by the name of the section.
     """
 
     def __init__(self, sections: Sequence[Section], results: Results, quick: bool) -> None:
         self._results = results
-        self._going = {section.name: section.course(quick) for section in sections}
-        self._plans = {name: next(course) for name, course in self._going.items()}
-        self.chapters: dict[str, Chapter] = {}
+        self._unfinished = {section.name: section.generate(quick) for section in sections}
+        self._first_plans = {name: next(generator) for name, generator in self._unfinished.items()}
+        self.contents: dict[str, SectionContent] = {}
 
     def next_plan(self) -> SectionPlan | None:
-        """What all sections need next, once what they needed before is there; None when all are finished."""
-        if not self._going:
+        """Return what all sections need next; None if all are finished.
+
+        Each call but the first assumes that the plan before has been carried out.
+        """
+        if not self._unfinished:
             return None
-        plans, self._plans = self._plans, {}
+        plans, self._first_plans = self._first_plans, {}
         if not plans:
-            for name, course in tuple(self._going.items()):
+            for name, generator in tuple(self._unfinished.items()):
                 try:
-                    plans[name] = course.send(self._results)
+                    plans[name] = generator.send(self._results)
                 except StopIteration as finished:
-                    self.chapters[name] = finished.value
-                    del self._going[name]
+                    self.contents[name] = finished.value
+                    del self._unfinished[name]
         cases = {case.key: case for plan in plans.values() for case in plan.cases}
         studies = {case.study.key: case for plan in plans.values() for case in plan.studies}
         return SectionPlan(tuple(cases.values()), tuple(studies.values())) if plans else None
 
 
-def _carry_out(
-    communicator: Intracomm, plan: SectionPlan, store: Store, tell: Tell, ranks_per_run: int
+def _make_runs(
+    communicator: Intracomm, plan: SectionPlan, store: Store, log: Tell, ranks_per_run: int
 ) -> int:
-    """Make the runs of a plan on all ranks, and say how many."""
+    """Make the runs of a plan on all ranks, and return how many they are."""
     cost = run_batch(
         communicator,
         [case.scene for case in plan.cases],
         store,
-        lambda progress: tell(f"runs: {progress_text(progress)}"),
+        lambda progress: log(f"runs: {progress_text(progress)}"),
         ranks_per_run,
     )
     runs = cost.runs
     for case in plan.studies:
-        telling = _telling(case.study.name, tell)
-        runs += run_study(communicator, case.study, store, telling, ranks_per_run).cost.runs
+        show = _progress_logger(case.study.name, log)
+        runs += run_study(communicator, case.study, store, show, ranks_per_run).cost.runs
     return runs
 
 
-def _telling(name: str, tell: Tell) -> Callable[[Snapshot], None]:
-    return lambda snapshot: tell(f"{name}: {progress_text(snapshot.progress)}")
+def _progress_logger(name: str, log: Tell) -> Callable[[Snapshot], None]:
+    return lambda snapshot: log(f"{name}: {progress_text(snapshot.progress)}")
 
 
-def _part(section: Section, chapter: Chapter) -> tuple[Part, dict[str, Drawn]]:
-    """The chapter as data, and its figures by the names of their files."""
-    content: list[str | list | Figure] = []
+def _part(section: Section, section_content: SectionContent) -> tuple[PaperSection, dict[str, Figure]]:
+    """Return a section as data, and its figures by the names of their files."""
+    content: list[str | list[Comparison] | ReportFigure] = []
     figures = {}
-    for element in chapter.content:
-        match element:
+    for block in section_content.blocks:
+        match block:
             case str():
-                content.append(element)
-            case Drawing():
-                name = f"{section.name}-{element.name}"
-                figures[name] = element.figure
-                command = element.command or f"ensemble report {ReportName.PAPER} --only {section.name}"
-                content.append(Figure(name=name, caption=element.caption, command=command))
+                content.append(block)
+            case SectionFigure():
+                name = f"{section.name}-{block.name}"
+                figures[name] = block.figure
+                command = block.command or f"ensemble report {ReportName.PAPER} --only {section.name}"
+                content.append(ReportFigure(name=name, caption=block.caption, command=command))
             case _:
-                content.append(list(element))
-    return Part(name=section.name, title=section.title, content=content), figures
+                content.append(list(block))
+    return PaperSection(name=section.name, title=section.title, content=content), figures

@@ -1,40 +1,69 @@
-"""The report as data."""
+"""The report on the paper as data."""
 
 from __future__ import annotations
 
-from ensemble.report.machine import Machine
-from ensemble.report.paper.comparison import Row
-from ensemble.report.report_model import Document
+from ensemble.report.paper.comparison import Comparison
+from ensemble.report.report_model import Machine, ReportModel
 
-Rows = list[Row]
+Comparisons = list[Comparison]
 
 
-class Figure(Document):
-    """A drawn figure: its files are ``<name>.png`` and ``<name>.svg``."""
+class ReportFigure(ReportModel):
+    """A figure; its files are ``<name>.png`` and ``<name>.svg``.
+
+    Attributes
+    ----------
+    name, caption : str
+        Name of the files, and caption in Markdown.
+    command : str
+        Command that computes what is drawn.
+    """
 
     name: str
     caption: str
     command: str
 
 
-class Part(Document):
-    """A section: Markdown, comparisons and figures in their order."""
+class PaperSection(ReportModel):
+    """A section of the report.
+
+    Attributes
+    ----------
+    name, title : str
+        Name and heading of the section.
+    content : list of str, list of Comparison or ReportFigure
+        Paragraphs in Markdown, tables of comparisons, and figures, in their order.
+    """
 
     name: str
     title: str
-    content: list[str | Rows | Figure]
+    content: list[str | Comparisons | ReportFigure]
 
     @property
-    def rows(self) -> Rows:
-        """All lines of its comparisons."""
-        return [row for element in self.content if isinstance(element, list) for row in element]
+    def rows(self) -> Comparisons:
+        """All comparisons of the section."""
+        return [row for block in self.content if isinstance(block, list) for row in block]
 
 
-class Paper(Document):
+class Paper(ReportModel):
     """The whole report.
 
-    runs : made for it this time; those in the store before are not among them.
-    wall_seconds : what it took this time, on `ranks` ranks.
+    Attributes
+    ----------
+    report : str
+        Name of the report.
+    quick : bool
+        Whether the report is thinned.
+    machine : Machine
+        The computer that made it.
+    ranks : int
+        Number of MPI ranks that made it.
+    runs : int
+        Runs that were made for it; those that were already in the store do not count.
+    wall_seconds : float
+        Time that it took.
+    parts : list of PaperSection
+        The sections, in their order.
     """
 
     report: str = "paper"
@@ -43,4 +72,4 @@ class Paper(Document):
     ranks: int
     runs: int
     wall_seconds: float
-    parts: list[Part]
+    parts: list[PaperSection]

@@ -1,4 +1,4 @@
-"""The report for people: Markdown, and the HTML made from it."""
+"""The report on the paper as Markdown, and as the HTML page that is made from it."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from string import Template
 
 from markdown_it import MarkdownIt
 
-from ensemble.report.paper.comparison import PERCENT, Row, Value
-from ensemble.report.paper.paper_document import Figure, Paper, Part
+from ensemble.report.paper.comparison import PERCENT, Comparison, Value
+from ensemble.report.paper.paper_document import Paper, PaperSection, ReportFigure
 
 _ABSENT = "–"
 _KEY_DIGITS = 8  # of a run's key, in tables; enough to find it
@@ -41,18 +41,31 @@ $body
 
 
 def paper_text(paper: Paper, suffix: str = ".png") -> str:
-    """Return the report as Markdown, with the figures of this kind."""
+    """Return the report as Markdown.
+
+    Parameters
+    ----------
+    paper : Paper
+        The report as data.
+    suffix : str
+        Which files of the figures to show, ``.png`` or ``.svg``.
+
+    Returns
+    -------
+    str
+        The text.
+    """
     rows = [row for part in paper.parts for row in part.rows]
     judged = [row for row in rows if row.agrees is not None]
     kept = sum(bool(row.agrees) for row in judged)
     sections = [
         "# The paper, recomputed",
-        f"{_SOURCE}: its figures and tables, computed again, with the published values beside the computed "
-        "ones.  *Deviation* is that of the computed from the published value; between brackets it is the "
-        "distance, 0 where they overlap.",
-        f"{'Quick (thinned) report.  ' if paper.quick else ''}{kept} of the {len(judged)} values for which a "
-        f"deviation is allowed keep it.  {paper.runs} runs made for it now, in {paper.wall_seconds:.0f} s "
-        f"on {paper.ranks} ranks; the others were in the store.",
+        f"{_SOURCE}: its figures and tables, computed again and compared with the published values.  The "
+        "*deviation* is that of the computed value from the published one; for brackets it is the distance "
+        "between them, 0 where they overlap.",
+        f"{'Quick (thinned) report.  ' if paper.quick else ''}{kept} of {len(judged)} values agree with the "
+        f"published ones within the allowed deviation.  {paper.runs} runs were made now, in "
+        f"{paper.wall_seconds:.0f} s on {paper.ranks} ranks; the others were in the store.",
         f"Made on: {paper.machine.sentence()}.",
         "\n".join(f"- [{part.title}](#{_anchor(part)})" for part in paper.parts),
         *(text for part in paper.parts for text in _part_text(part, suffix)),
@@ -61,22 +74,33 @@ def paper_text(paper: Paper, suffix: str = ".png") -> str:
 
 
 def paper_page(paper: Paper) -> str:
-    """Return the report as an HTML page."""
+    """Return the report as an HTML page.
+
+    Parameters
+    ----------
+    paper : Paper
+        The report as data.
+
+    Returns
+    -------
+    str
+        The page.
+    """
     markdown = MarkdownIt("commonmark").enable("table")
     return _PAGE.substitute(title="The paper, recomputed", body=markdown.render(paper_text(paper, ".svg")))
 
 
-def _anchor(part: Part) -> str:
+def _anchor(part: PaperSection) -> str:
     return f"section-{part.name}"
 
 
-def _part_text(part: Part, suffix: str) -> list[str]:
+def _part_text(part: PaperSection, suffix: str) -> list[str]:
     texts = [f'<a id="{_anchor(part)}"></a>', f"## {part.title}"]
     for element in part.content:
         match element:
             case str():
                 texts.append(element)
-            case Figure():
+            case ReportFigure():
                 texts += [
                     f"![{element.name}]({element.name}{suffix})",
                     f"*{element.caption}*",
@@ -87,7 +111,7 @@ def _part_text(part: Part, suffix: str) -> list[str]:
     return texts
 
 
-def _table(rows: list[Row]) -> str:
+def _table(rows: list[Comparison]) -> str:
     noted = any(row.note for row in rows)
     heading = ["", "published", "computed", "deviation", "allowed", *(["note"] if noted else [])]
     lines = [heading, ["---"] * len(heading)]
@@ -107,8 +131,8 @@ def _table(rows: list[Row]) -> str:
     return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)
 
 
-def _sources(rows: list[Row]) -> str:
-    """Runs and commands behind a table, folded away."""
+def _sources(rows: list[Comparison]) -> str:
+    """Return the runs and commands behind a table, folded away."""
     items = []
     for row in rows:
         if row.command or row.runs:
@@ -133,12 +157,12 @@ def _value(value: Value) -> str:
             return f"{value:.4g}"
 
 
-def _deviation(row: Row) -> str:
+def _deviation(row: Comparison) -> str:
     if row.deviation is None:
         return ""
     digits = 2 if row.unit == PERCENT else 3
     return f"{row.deviation:+.{digits}f}{_unit(row)}"
 
 
-def _unit(row: Row) -> str:
+def _unit(row: Comparison) -> str:
     return f" {row.unit}" if row.unit == PERCENT or row.unit[:1].isalpha() else row.unit

@@ -1,4 +1,4 @@
-"""What a section of the paper's report is, and what it may ask for and must give."""
+"""What a section of the paper's report is: what it may ask for, and what it returns."""
 
 from __future__ import annotations
 
@@ -8,23 +8,40 @@ from dataclasses import dataclass
 from matplotlib.figure import Figure
 
 from ensemble.report.paper.case import Case, StudyCase
-from ensemble.report.paper.comparison import Row
+from ensemble.report.paper.comparison import Comparison
 from ensemble.report.paper.results import Results
 
 
 @dataclass(frozen=True)
 class SectionPlan:
-    """Runs and boundaries that a section needs next."""
+    """Runs and boundaries that a section needs next.
+
+    Attributes
+    ----------
+    cases : sequence of Case
+        The runs.
+    studies : sequence of StudyCase
+        The boundaries.
+    """
 
     cases: Sequence[Case] = ()
     studies: Sequence[StudyCase] = ()
 
 
 @dataclass(frozen=True)
-class Drawing:
-    """A figure, with its name (also that of its files), a caption and the command behind it.
+class SectionFigure:
+    """A figure of a section.
 
-    Without a command it is the one that makes the section.
+    Attributes
+    ----------
+    name : str
+        Its name in the section, and in the names of its files.
+    caption : str
+        Its caption, in Markdown.
+    figure : Figure
+        What is drawn.
+    command : str
+        Command that computes what is drawn; if empty, the command that makes the section.
     """
 
     name: str
@@ -34,29 +51,37 @@ class Drawing:
 
 
 @dataclass(frozen=True)
-class Chapter:
-    """What a section has to say, in this order: Markdown, comparisons and figures."""
+class SectionContent:
+    """What a section shows.
 
-    content: Sequence[str | Sequence[Row] | Drawing]
+    Attributes
+    ----------
+    blocks : sequence of str, sequence of Comparison or SectionFigure
+        Paragraphs in Markdown, tables of comparisons, and figures, in their order.
+    """
+
+    blocks: Sequence[str | Sequence[Comparison] | SectionFigure]
 
 
-Course = Generator[SectionPlan, Results, Chapter]
+SectionGenerator = Generator[SectionPlan, Results, SectionContent]
 
 
 @dataclass(frozen=True)
 class Section:
     """A section of the report.
 
-    Parameters
+    Attributes
     ----------
     name : str
-        As in ``--only`` and in the names of its figures.
+        Its name in ``--only`` and in the names of its figures.
     title : str
-    course : callable
-        Takes whether the report is to be quick.  The generator that it returns yields plans; each time it
-        gets the results of everything planned so far.  It ends by returning its chapter.
+        Its heading.
+    generate : callable
+        Takes one argument, whether the report is to be quick, and returns a generator.  The generator
+        yields plans; after each it receives the results of everything planned so far.  It ends by returning
+        the content of the section.
     """
 
     name: str
     title: str
-    course: Callable[[bool], Course]
+    generate: Callable[[bool], SectionGenerator]

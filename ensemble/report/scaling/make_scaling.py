@@ -10,8 +10,8 @@ import numpy as np
 
 from ensemble.mpi.scaling_model import ScalingModel
 from ensemble.report import ReportName
-from ensemble.report.files import Report, report_directory, write_report
-from ensemble.report.machine import Machine
+from ensemble.report.report_files import FinishedReport, report_directory, write_report
+from ensemble.report.report_model import Machine
 from ensemble.report.report_progress import Tell
 from ensemble.report.scaling.measure import Measured, collectives, evaluation, pair_seconds, peak_memory
 from ensemble.report.scaling.model_fit import (
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 _ROUNDS = 3  # in which numbers of ranks take turns: a machine's speed changes within minutes
 
 
-def make_scaling(communicator: Intracomm, store: Store, quick: bool, tell: Tell) -> Report | None:
+def make_scaling(communicator: Intracomm, store: Store, quick: bool, tell: Tell) -> FinishedReport | None:
     """Measure on 1, 2, 4, … and all ranks, then write ``reports/scaling/`` in the store.
 
     Collective.  The files are ``report.md``, ``report.json`` and the figures, as PNG and as SVG.
@@ -51,7 +51,7 @@ def make_scaling(communicator: Intracomm, store: Store, quick: bool, tell: Tell)
 
     Returns
     -------
-    Report
+    FinishedReport
         On the first rank; None elsewhere.
     """
     document = measured(communicator, QUICK if quick else FULL, tell)
@@ -59,7 +59,7 @@ def make_scaling(communicator: Intracomm, store: Store, quick: bool, tell: Tell)
         return None
     figures = scaling_figures(document)
     text = scaling_text(document, [f"{name}.png" for name in figures])
-    report = Report(report_directory(store, ReportName.SCALING), document, text)
+    report = FinishedReport(report_directory(store, ReportName.SCALING), document, text)
     write_report(report, figures)
     return report
 

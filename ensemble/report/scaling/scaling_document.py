@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from ensemble.mpi.scaling_model import ScalingModel
-from ensemble.report.machine import Machine
-from ensemble.report.report_model import Document
+from ensemble.report.report_model import Machine, ReportModel
 
 
-class Evaluation(Document):
+class Evaluation(ReportModel):
     """One evaluation of the right-hand side, shared by ranks.
 
     efficiency : speed-up over one rank, divided by the ranks.
@@ -32,7 +31,7 @@ class Evaluation(Document):
     difference: float
 
 
-class Weak(Document):
+class Weak(ReportModel):
     """An evaluation with as many pairs of points on each rank as on one alone."""
 
     vesicles: int
@@ -41,7 +40,7 @@ class Weak(Document):
     efficiency: float
 
 
-class Collective(Document):
+class Collective(ReportModel):
     """An Allgatherv that brings together this many bytes."""
 
     ranks: int
@@ -49,7 +48,7 @@ class Collective(Document):
     seconds: float
 
 
-class Cost(Document):
+class Cost(ReportModel):
     """What an evaluation costs one rank; memory is the largest that the process has had by then.
 
     sums : velocities of all points by all points in it.
@@ -62,7 +61,7 @@ class Cost(Document):
     with_fast_summation: float | None  # seconds, predicted
 
 
-class Prediction(Document):
+class Prediction(ReportModel):
     """Efficiency by the model at many ranks."""
 
     vesicles: int
@@ -70,14 +69,14 @@ class Prediction(Document):
     efficiency: float
 
 
-class Recommendation(Document):
+class Recommendation(ReportModel):
     """The most ranks on which a run is efficient, of as many as there may be, by the model."""
 
     vesicles: int
     ranks: int
 
 
-class Crossover(Document):
+class Crossover(ReportModel):
     """From where on a fast multipole method would sum faster than series of vesicles and their near points.
 
     pairs_a_point : what it costs for each point, in pairs of the direct sum.
@@ -94,7 +93,7 @@ class Crossover(Document):
     assumption: str
 
 
-class Scaling(Document):
+class Scaling(ReportModel):
     """The whole report."""
 
     report: str = "scaling"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ensemble.mpi.scaling_model import LEAST_EFFICIENCY, ScalingModel
-from ensemble.report.markdown import table
+from ensemble.report.markdown_table import table
 from ensemble.report.scaling.scaling_document import Scaling
 
 _EVALUATION = {

@@ -1,0 +1,1 @@
+"""The stability report: how far runs of stiff and extreme scenes can be trusted."""

@@ -1,0 +1,1 @@
+"""The work-precision report: error against run time of every integrator in short scenes."""

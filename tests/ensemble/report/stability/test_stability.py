@@ -1,0 +1,137 @@
+"""The stability report: verdicts that hold, scenes that reach the extremes, and the command that makes it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ensemble.report.stability.extreme_scenes import EXTREME_SCENES
+from ensemble.report.stability.make_stability import energy_rise, judge, judge_scenes, quick_groups
+from ensemble.report.stability.stability_document import Stability, StabilityVerdict
+from ensemble.report.timed_runs import TimedRuns
+from ensemble.store import Store
+from solver.analysis.run import Outcome
+from solver.scene import Numerics, Scene, Trap, Vesicle
+from solver.simulation.simulate import simulate
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Iterator[Store]:
+    with Store.open(tmp_path / "store") as opened:
+        yield opened
+
+
+EXTREMES = {name: scene for scenes in EXTREME_SCENES.values() for name, scene in scenes.items()}
+
+
+@pytest.mark.parametrize("name", EXTREMES)
+def test_every_extreme_scene_is_valid_and_limited(name):
+    scene = EXTREMES[name]
+    assert Scene.model_validate(scene.model_dump()) == scene
+    assert scene.numerics.work_limit <= 400_000
+
+
+def test_the_extreme_scenes_reach_what_they_should():
+    assert len(EXTREMES) == sum(map(len, EXTREME_SCENES.values())) >= 40  # no name twice
+    scenes = EXTREMES.values()
+    adhesions = [scene.adhesion for scene in scenes if scene.adhesion]
+    vesicles = [vesicle for scene in scenes for vesicle in scene.vesicles]
+    assert {(12, 6), (24, 12)} <= {adhesion.exponents for adhesion in adhesions}
+    assert min(adhesion.distance for adhesion in adhesions) == 0.01
+    assert max(adhesion.hamaker for adhesion in adhesions) == 1e3
+    assert {0.3, 0.999, 1.0} <= {vesicle.reduced_area for vesicle in vesicles}
+    assert {1e-4, 1e2} <= {vesicle.bending_modulus for vesicle in vesicles}
+    assert {1e-2, 10.0, 1e3} <= {vesicle.viscosity_contrast for vesicle in vesicles}
+    assert any(adhesion.cutoff for adhesion in adhesions)
+    assert {1e-3, 1e2} <= {scene.flow.rate for scene in scenes if scene.flow}
+    assert {16, 512} <= {scene.numerics.points for scene in scenes}
+    assert max(scene.horizon for scene in scenes) == 1e4
+    assert any(len({vesicle.length for vesicle in scene.vesicles}) == 2 for scene in scenes)
+
+
+def test_verdicts_follow_the_criteria():
+    pair = EXTREMES["start at a quarter of the adhesion distance, at rest"]
+    coarse = Numerics(points=48, tolerance=1e-3)
+    run = simulate(pair.model_copy(update={"horizon": 2.0, "numerics": coarse}))
+    rise = energy_rise(run)
+    assert judge(run, rise) == (StabilityVerdict.FINE, "")
+
+    def with_errors(**errors: float):
+        return replace(run, error=replace(run.error, **errors))
+
+    assert judge(with_errors(spatial=2e-3), rise)[0] is StabilityVerdict.SPACE
+    assert judge(with_errors(spatial=float("nan")), rise)[0] is StabilityVerdict.SPACE
+    assert judge(with_errors(area=2e-2), rise)[0] is StabilityVerdict.TIME
+    assert judge(with_errors(closure=2e-2), rise)[0] is StabilityVerdict.TIME
+    assert judge(run, 2e-3)[0] is StabilityVerdict.TIME
+    failed = replace(run, outcome=Outcome.FAILED, failure="no step is small enough")
+    assert judge(failed, rise) == (StabilityVerdict.FAILED, "no step is small enough")
+
+
+def test_the_energy_rise_is_the_largest_above_any_earlier_value():
+    fine = Numerics(points=64, tolerance=1e-7)
+    run = simulate(Scene(horizon=1.0, vesicles=(Vesicle(),), numerics=fine))
+    assert energy_rise(run) < 1e-6
+    climbing = replace(run, series={**run.series, "bending_energy": np.array([10.0, 6.0, 8.0, 5.0, 6.5])})
+    assert energy_rise(climbing) == pytest.approx(0.2)
+
+
+def test_a_scene_that_raises_does_not_hide_the_others(store):
+    good = Scene(horizon=1.0, vesicles=(Vesicle(),), numerics=Numerics(points=48))
+    broken = good.model_copy(update={"vesicles": ()})
+    limited = good.model_copy(update={"flow": Trap(rate=0.1), "numerics": Numerics(points=32, work_limit=5)})
+    rows = judge_scenes(
+        TimedRuns(store, lambda line: None), {"group": {"broken": broken, "limited": limited, "good": good}}
+    ).rows
+    assert [row.verdict for row in rows] == [
+        StabilityVerdict.FAILED,
+        StabilityVerdict.FAILED,
+        StabilityVerdict.FINE,
+    ]
+    assert rows[0].failure.startswith("raised ")
+    assert "work limit" in rows[1].failure
+    assert rows[2].smallest_step > 0
+    assert rows[2].smallest_step == store.summary(rows[2].run_key).work.smallest_step
+
+
+def test_the_command_writes_a_report_into_the_store_and_resumes(ensemble, tmp_path):
+    command = ("report", "stability", "--quick", "--store", str(tmp_path / "store"), "--json")
+    first = ensemble(*command)
+    assert first.returncode == 0, first.stderr
+    document = Stability.model_validate_json(first.stdout)
+    quick = quick_groups(EXTREME_SCENES)
+    names = [name for scenes in quick.values() for name in scenes]
+    assert [row.scene for row in document.rows] == names
+    assert [line.partition(": ")[2] for line in first.stderr.splitlines()] == names
+    assert all(row.evaluations <= 3_500 for row in document.rows)
+
+    directory = tmp_path / "store" / "reports" / "stability"
+    assert {file.name for file in directory.iterdir()} == {
+        "report.md",
+        "report.json",
+        "scenes.png",
+        "scenes.svg",
+    }
+    assert Stability.model_validate_json((directory / "report.json").read_text()) == document
+    assert (directory / "scenes.png").read_bytes().startswith(b"\x89PNG")
+    assert all(name in (directory / "report.md").read_text() for name in names)
+
+    again = ensemble(*command)
+    assert again.stderr == ""
+    assert json.loads(again.stdout) == json.loads(first.stdout)
+    assert ensemble("check", "--store", str(tmp_path / "store")).returncode == 0
+
+
+def test_bad_input_is_refused(ensemble, tmp_path):
+    assert ensemble("report", "weather", cwd=tmp_path).returncode == 2
+    file = tmp_path / "file"
+    file.write_text("")
+    refused = ensemble("report", "stability", "--quick", f"--store={file}", cwd=tmp_path)
+    assert refused.returncode == 2
+    assert "store" in refused.stderr
+    assert list(Path(tmp_path).iterdir()) == [file]
