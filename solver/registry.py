@@ -1,6 +1,6 @@
-"""Registered models: a field of a scene that is one of several models, told apart by their ``kind``.
+"""What may be added to a scene from outside: models told apart by their ``kind``, and names.
 
-A registry is the annotation of such a field::
+A `Registry` of models is the annotation of such a field::
 
     FLOWS: Registry[ImposedFlow] = Registry()
     FLOWS.add(Shear)
@@ -10,7 +10,8 @@ A registry is the annotation of such a field::
 
 Documents, errors and JSON schemas are those of pydantic's discriminated union of the registered models.
 Unlike that union, a registry is looked up whenever a document is validated, so that a model may be added
-after the classes with such a field have been made.
+after the classes with such a field have been made.  `RegisteredNames` are the same for a field that is one of
+several strings, instead of a ``Literal``.
 """
 
 from __future__ import annotations
@@ -114,3 +115,63 @@ class Registry(Generic[M]):
 def _kind_of(model: type[BaseModel]) -> str:
     kind: str = model.model_fields[_DISCRIMINATOR].default
     return kind
+
+
+class RegisteredNames:
+    """Strings that a field may be.
+
+    Parameters
+    ----------
+    *names : str
+        To begin with.
+    """
+
+    def __init__(self, *names: str) -> None:
+        self._names = list(names)
+
+    def add(self, name: str) -> None:
+        """Register a name.
+
+        Parameters
+        ----------
+        name : str
+
+        Raises
+        ------
+        ValueError
+            If it is registered already.
+        """
+        if name in self._names:
+            raise ValueError(f"the name {name!r} is registered already")
+        self._names.append(name)
+
+    def remove(self, name: str) -> None:
+        """Undo `add`.
+
+        Parameters
+        ----------
+        name : str
+            A registered name.
+        """
+        self._names.remove(name)
+
+    def __iter__(self) -> Iterator[str]:
+        """Iterate over the registered names in the order of their registration."""
+        return iter(tuple(self._names))
+
+    def _validate(self, value: Any) -> str:
+        if isinstance(value, str) and value in self._names:
+            return value
+        *others, last = map(repr, self._names)
+        expected = f"{', '.join(others)} or {last}" if others else last
+        raise PydanticKnownError("literal_error", {"expected": expected})
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Validate by looking the name up."""
+        return core_schema.no_info_plain_validator_function(self._validate)
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """Describe the names registered now."""
+        return {"type": "string", "enum": list(self._names)}

@@ -13,11 +13,10 @@ from solver.analysis.line_of_centers import LineOfCenters
 from solver.analysis.rheology import adhesion_stress, membrane_stress
 from solver.analysis.run import Frames, Series, VesicleSeries
 from solver.membrane import curve
-from solver.membrane.geometry import Geometry, Membranes
+from solver.membrane.geometry import Membranes
 from solver.membrane.spectral import resampled
 from solver.membrane.symmetry import independent_vesicles
-from solver.motion.dense import DenseEquation, Motion
-from solver.motion.equation import EquationOfMotion
+from solver.motion.equation import EquationOfMotion, Motion
 from solver.potentials.proximity import gap, waist_error
 from solver.simulation.resolution import carried, resampled_angle, shape_tails
 
@@ -26,18 +25,6 @@ Measure = Callable[[Motion], float]
 VesicleMeasure = Callable[[Motion], Array]
 
 _MANY = 3  # vesicles, from which on each of them is measured
-
-
-def areas(geometry: Geometry) -> Array:
-    """Area of each vesicle, (M,)."""
-    points, tangents = geometry.points.swapaxes(0, 1), geometry.tangents.swapaxes(0, 1)
-    return curve.area(points, tangents, geometry.membranes.length)
-
-
-def conserved_quantities(geometry: Geometry) -> Array:
-    """What the exact motion keeps, (3·M,): reduced areas, and what curves fail to close by, over length."""
-    reduced_areas = 4 * np.pi * areas(geometry) / geometry.membranes.length**2
-    return np.concatenate([reduced_areas, geometry.tangents.mean(axis=2).ravel()])
 
 
 def state_rate(membranes: Membranes, change: Array, duration: float) -> float:
@@ -57,7 +44,7 @@ def measures(setting: scene.Scene, dynamics: EquationOfMotion) -> dict[str, Meas
 
     found: dict[str, Measure] = {
         "bending_energy": lambda motion: dynamics.bending.energy(motion.geometry),
-        "area_error": lambda motion: float(np.max(np.abs(areas(motion.geometry) / target_area - 1))),
+        "area_error": lambda motion: float(np.max(np.abs(motion.geometry.areas / target_area - 1))),
         "closure_error": lambda motion: float(curve.closure(motion.geometry.tangents.swapaxes(0, 1)).max()),
     }
     adhesion = dynamics.adhesion
@@ -78,7 +65,7 @@ def measures(setting: scene.Scene, dynamics: EquationOfMotion) -> dict[str, Meas
         found["viscosity_bending_tension"] = lambda motion: scale * membrane_stress(motion)
         if adhesion:
             found["viscosity_adhesion"] = lambda motion: scale * adhesion_stress(motion)
-        contrast = dynamics.contrast if isinstance(dynamics, DenseEquation) else None
+        contrast = dynamics.contrast
         if contrast:
             found["viscosity_contrast"] = lambda motion: (
                 scale * contrast.stress(motion.geometry, motion.velocity)
@@ -94,7 +81,7 @@ def vesicle_measures(setting: scene.Scene) -> dict[str, VesicleMeasure]:
     found: dict[str, VesicleMeasure] = {
         "vesicle_center": lambda motion: motion.geometry.centers.T,
         "vesicle_inclination_angle": lambda motion: curve.inclination(motion.geometry.points.swapaxes(0, 1)),
-        "vesicle_area_error": lambda motion: areas(motion.geometry) / target_area - 1,
+        "vesicle_area_error": lambda motion: motion.geometry.areas / target_area - 1,
     }
     if setting.adhesion:
         contact = CONTACT * setting.adhesion.distance
@@ -142,7 +129,7 @@ class Recorder:
         if self._previous:
             change, duration = state - self._previous[1], time - self._previous[0]
         else:
-            change, duration = self._dynamics.rate_of(motion), 1.0
+            change, duration = motion.rate, 1.0
         self._append("state_rate", state_rate(membranes, change, duration))
         self._previous = time, state
         self.spatial_error = max(self.spatial_error, *self._spatial_errors(motion, state))

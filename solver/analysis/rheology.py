@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.membrane.geometry import Geometry
-from solver.motion.dense import Motion
+from solver.motion.equation import Motion
 
 Array = NDArray[np.float64]
 

@@ -1,6 +1,6 @@
-"""Tension of many membranes: conjugate gradients as in `solver.forces.tension`, with sums instead of a matrix.
+"""Tension of many membranes: conjugate gradients as in `Inextensibility`, with sums instead of a matrix.
 
-The preconditioner is each vesicle's own inverse.  The iteration begins with the tension found last.
+The preconditioner is each vesicle's own inverse.  The iteration begins with a tension known from before.
 """
 
 from __future__ import annotations
@@ -22,12 +22,13 @@ _LIMIT = 100  # iterations; measured: 4 to 8 are usual
 
 
 class Preconditioner(NamedTuple):
-    """What each vesicle's tension does to itself.
+    """What each vesicle's tension does to itself: `TensionInverse` of each vesicle by itself.
 
-    inverses : (M, N, N)
-        `Inextensibility.inverse` of each vesicle alone.
-    shifts : (M, 1)
-        What times the mean tension is added on each, `Inextensibility.shift`.
+    Parameters
+    ----------
+    inverses : (M, N, N) array
+    shifts : (M, 1) array
+        What times the mean tension is added on each.
     """
 
     inverses: Array
@@ -60,7 +61,6 @@ class SummedInextensibility:
     def __init__(self, tolerance: float) -> None:
         self.tolerance = tolerance
         self.iterations = 0
-        self._last: Array | None = None
 
     def solve(
         self,
@@ -69,11 +69,30 @@ class SummedInextensibility:
         preconditioner: Preconditioner,
         density: Array,
         flow: Array | None,
+        guess: Array | None,
     ) -> Inextensible:
-        """The motion under a force density without tension, (2, M, N), in a flow of velocity (2, M, N).
+        """Find the motion under forces without tension, in a flow.
 
         Each rank iterates on its share of the vesicles; sums over all of them are made in the same order on
         every rank.
+
+        Parameters
+        ----------
+        layer : SummedSingleLayer
+            Assembled for the geometry.
+        geometry : Geometry
+        preconditioner : Preconditioner
+            Of a geometry like this one.
+        density : (2, M, N) array
+            Force per length without tension.
+        flow : (2, M, N) array or None
+            Imposed velocity.
+        guess : (M, N) array or None
+            Tension with which the iteration begins; zero without.
+
+        Returns
+        -------
+        Inextensible
 
         Raises
         ------
@@ -97,7 +116,7 @@ class SummedInextensibility:
             sums = [np.einsum("ij,ij->i", first, second) for first, second in pairs]
             return shares.gather(np.stack(sums, axis=1)).sum(axis=0)
 
-        tension = np.zeros(tangents.shape[1:]) if self._last is None else self._last[own].copy()
+        tension = np.zeros(tangents.shape[1:]) if guess is None else guess[own].copy()
         velocity = layer.velocity(density[:, own] * spacing + pull(tension))
         if flow is not None:
             velocity += flow[:, own]
@@ -133,5 +152,4 @@ class SummedInextensibility:
         velocity_x, velocity_y, rotation_rate, tension = shares.gather(
             np.stack([*velocity, rotation_rate, tension]), axis=1
         )
-        self._last = tension
         return Inextensible(tension, np.stack([velocity_x, velocity_y]), rotation_rate)

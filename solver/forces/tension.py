@@ -43,13 +43,34 @@ class Mobility(Protocol):
 class Inextensible(NamedTuple):
     """A motion that does not stretch the membranes.
 
-    tension : (M, N); velocity : (2, M, N); turning : (M, N)
-        The tension that achieves it, the velocity with it, and n · u_s, how fast the material turns.
+    Parameters
+    ----------
+    tension : (M, N) array
+        What achieves it.
+    velocity : (2, M, N) array
+        With that tension.
+    rotation_rate : (M, N) array
+        n · u_s, how fast the material turns.
     """
 
     tension: Array
     velocity: Array
     rotation_rate: Array
+
+
+class TensionInverse(NamedTuple):
+    """The inverse of A in one geometry, which preconditions the search for the tension in others.
+
+    Parameters
+    ----------
+    matrix : (M·N, M·N) array
+        Weighted with the spacing.
+    shift : float
+        What times the mean tension of a vesicle was added to A σ.
+    """
+
+    matrix: Array
+    shift: float
 
 
 @compiled
@@ -131,29 +152,45 @@ class Inextensibility:
 
     Attributes
     ----------
-    inverse, shift
-        Of A, (M·N, M·N), as `factorize` last made it, and what times the mean tension of a vesicle is added
-        to it.
+    iterations : int
+        So far.
     """
 
     def __init__(self, tolerance: float, elasticity: float) -> None:
         self.tolerance = tolerance
         self.iterations = 0
         self._elasticity = elasticity
-        self.inverse: Array | None = None
-        self.shift = 0.0
 
-    def solve(self, layer: Mobility, geometry: Geometry, imposed: Array) -> Inextensible:
-        """The motion when all forces but the tension, and the flow, cause the velocity ``imposed`` (2, M, N).
+    def solve(
+        self, layer: Mobility, geometry: Geometry, imposed: Array, known: TensionInverse | None = None
+    ) -> tuple[Inextensible, TensionInverse]:
+        """Find the motion when all forces but the tension, and the flow, cause a velocity.
+
+        Parameters
+        ----------
+        layer : Mobility
+            Assembled for the geometry.
+        geometry : Geometry
+        imposed : (2, M, N) array
+            That velocity.
+        known : TensionInverse or None
+            Of another geometry, preferably one like this.
+
+        Returns
+        -------
+        Inextensible
+        TensionInverse
+            The one that served: the known one, or that of this geometry if there was none or if the iteration
+            with it was too slow.
 
         Raises
         ------
         TensionNotFoundError
-            If the iteration does not converge even with an inverse of this very geometry.
+            If the iteration does not converge even with the inverse of this very geometry.
         """
-        for inverse, limit in ((self.inverse, 25), (None, 200)):
+        for inverse, limit in ((known, 25), (None, 200)):
             if inverse is None:
-                self.factorize(layer, geometry)
+                inverse, _ = self.factorize(layer, geometry)
             membranes = geometry.membranes
             found = Inextensible(
                 np.empty(imposed.shape[1:]), np.empty(imposed.shape), np.empty(imposed.shape[1:])
@@ -164,8 +201,8 @@ class Inextensibility:
                 differentiation(membranes.points).T,
                 membranes.wavenumber,
                 membranes.spacing[:, None],
-                self.inverse,
-                self.shift,
+                inverse.matrix,
+                inverse.shift,
                 self.tolerance,
                 membranes.natural_rate,
                 limit,
@@ -174,18 +211,28 @@ class Inextensibility:
             )
             if iterations >= 0:
                 self.iterations += iterations
-                return found
+                return found, inverse
         raise TensionNotFoundError("the tension could not be found: the membrane is too distorted")
 
-    def factorize(self, layer: Mobility, geometry: Geometry) -> tuple[Array, Array]:
-        """Make the dense inverse for this geometry.
+    def factorize(self, layer: Mobility, geometry: Geometry) -> tuple[TensionInverse, Array]:
+        """Make the inverse of A for a geometry.
+
+        Parameters
+        ----------
+        layer : Mobility
+            Assembled for the geometry.
+        geometry : Geometry
 
         Returns
         -------
-        inverse : (M·N, M·N)
-            Of A, weighted with the spacing.
-        flow : (2, M·N, M·N)
+        TensionInverse
+        (2, M·N, M·N) array
             S T, the velocity of each unit tension.
+
+        Raises
+        ------
+        TensionNotFoundError
+            If A is not positive, because a membrane is too distorted.
         """
         membranes = geometry.membranes
         points, count = membranes.points, membranes.count
@@ -196,10 +243,10 @@ class Inextensibility:
         system = self.stretching(geometry, flow)
         system *= -np.repeat(membranes.spacing, points)[:, None]
         typical = np.trace(system) / (count * points)
-        self.shift = self._elasticity * typical
+        shift = self._elasticity * typical
         # Differentiation loses the highest mode, whose tension gets the weight of its neighbors.
         alternating = np.where(np.arange(points) % 2 == 0, 1.0, -1.0)
-        added = (self.shift + typical * np.outer(alternating, alternating)) / points
+        added = (shift + typical * np.outer(alternating, alternating)) / points
         for vesicle in range(count):
             block = slice(vesicle * points, (vesicle + 1) * points)
             system[block, block] += added
@@ -210,8 +257,7 @@ class Inextensibility:
         triangle, _ = lapack.dpotri(factor, lower=0, overwrite_c=1)
         inverse = np.triu(triangle)
         inverse += np.triu(triangle, 1).T
-        self.inverse = np.ascontiguousarray(inverse)
-        return self.inverse, flow
+        return TensionInverse(np.ascontiguousarray(inverse), shift), flow
 
     @staticmethod
     def stretching(geometry: Geometry, velocity: Array) -> Array:

@@ -1,14 +1,22 @@
-"""Time integrators: one method a module, all behind `Integrator`; `integrator_for` chooses."""
+"""Time integrators, one method a module.
 
-from solver.integrators.base import Integrator, Step, StepFailedError
-from solver.integrators.bdf import BackwardDifferentiation
+Every module of this folder is imported here, so that its integrators are registered (`base.register`).
+"""
+
+from importlib import import_module
+from pkgutil import iter_modules
+
+from solver.integrators.base import InitialValueProblem, Integrator, Step, StepFailedError
 from solver.integrators.choice import integrator_for, usual_integrator
 
 __all__ = [
-    "BackwardDifferentiation",
+    "InitialValueProblem",
     "Integrator",
     "Step",
     "StepFailedError",
     "integrator_for",
     "usual_integrator",
 ]
+
+for _module in iter_modules(__path__):
+    import_module(f"{__name__}.{_module.name}")

@@ -1,13 +1,25 @@
-"""What the time loop asks of an integrator."""
+"""What an integrator is given, what it does, and how it is registered.
+
+To add an integrator, write a module in this folder with a function that is registered here, and add its name
+to `solver.scene.numerics.INTEGRATORS`::
+
+    @register("midpoint")
+    def midpoint(problem: InitialValueProblem, numerics: Numerics) -> Integrator:
+        return ...
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
+
+from solver.motion.jacobian import Jacobian
+from solver.scene import Numerics
 
 Array = NDArray[np.float64]
 
@@ -16,13 +28,85 @@ class StepFailedError(ArithmeticError):
     """No further step is possible; the message says why."""
 
 
+class DifferentialEquation(Protocol):
+    """An equation dy/dt = f(y) for a state y of n numbers.
+
+    What it raises where f does not exist is an `ArithmeticError`.
+    """
+
+    def rate(self, state: Array) -> Array:
+        """Compute f.
+
+        Parameters
+        ----------
+        state : (n,) array
+
+        Returns
+        -------
+        (n,) array
+        """
+
+    def jacobian(self, state: Array) -> Jacobian:
+        """Compute the derivative of f by the state.
+
+        Parameters
+        ----------
+        state : (n,) array
+
+        Returns
+        -------
+        Jacobian
+        """
+
+    def conserved(self, state: Array) -> Array:
+        """Return quantities of order 1 that the exact solution keeps, for the step control by them.
+
+        Parameters
+        ----------
+        state : (n,) array
+
+        Returns
+        -------
+        (k,) array
+        """
+
+
+@dataclass(frozen=True)
+class InitialValueProblem:
+    """What an integrator solves.
+
+    Parameters
+    ----------
+    equation : DifferentialEquation
+    state : (n,) array
+        Where the first step begins.
+    start : float
+        When the first step begins.
+    end : float
+        When the last step ends.
+    """
+
+    equation: DifferentialEquation
+    state: Array
+    start: float
+    end: float
+
+
 @dataclass(frozen=True)
 class Step:
     """One accepted step.
 
-    interpolate : maps a time in [start, end] to the state there, to the method's order.
-    local_error : root mean square of the estimated error that the step added to the state.
-    shortened : whether a first attempt with a larger step was rejected.
+    Parameters
+    ----------
+    start, end : float
+    state : (n,) array
+        At the end.
+    interpolate : callable
+        From a time in [start, end] to the state there, to the method's order.
+    local_error : float
+        Root mean square of the estimated error that the step added to the state.
+    shortened : bool
+        Whether a first attempt with a larger step was rejected.
     """
 
     start: float
@@ -33,7 +117,16 @@ class Step:
     shortened: bool
 
     def until(self, time: float) -> Self:
-        """The part of the step up to a time in it."""
+        """Return the part of the step up to a time in it.
+
+        Parameters
+        ----------
+        time : float
+
+        Returns
+        -------
+        Step
+        """
         return replace(self, end=time, state=self.interpolate(time))
 
 
@@ -42,7 +135,7 @@ class Integrator(Protocol):
 
     @property
     def jacobian_evaluations(self) -> int:
-        """Number of Jacobians made."""
+        """Number of Jacobians computed."""
 
     @property
     def factorizations(self) -> int:
@@ -51,8 +144,59 @@ class Integrator(Protocol):
     def step(self) -> Step:
         """Take one step.
 
+        Returns
+        -------
+        Step
+
         Raises
         ------
         StepFailedError
             If no step of representable size satisfies the tolerance.
         """
+
+
+IntegratorFactory = Callable[[InitialValueProblem, Numerics], Integrator]
+
+_factories: dict[str, IntegratorFactory] = {}
+
+# By name; see `register`.
+FACTORIES: Mapping[str, IntegratorFactory] = MappingProxyType(_factories)
+
+
+def register(name: str) -> Callable[[IntegratorFactory], IntegratorFactory]:
+    """Register the decorated function as the one that makes the integrators of this name.
+
+    Parameters
+    ----------
+    name : str
+        As in ``numerics.integrator`` of a scene.
+
+    Returns
+    -------
+    callable
+        The decorator.
+
+    Raises
+    ------
+    ValueError
+        If the name is registered already.
+    """
+
+    def registered(factory: IntegratorFactory) -> IntegratorFactory:
+        if name in _factories:
+            raise ValueError(f"an integrator {name!r} is registered already")
+        _factories[name] = factory
+        return factory
+
+    return registered
+
+
+def unregister(name: str) -> None:
+    """Undo `register`.
+
+    Parameters
+    ----------
+    name : str
+        A registered name.
+    """
+    del _factories[name]

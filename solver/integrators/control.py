@@ -59,25 +59,6 @@ class StepControl(Protocol):
         """Reject an attempt of this size that has no finite result."""
 
 
-class FixedStep:
-    """The same size throughout; every finite attempt is accepted."""
-
-    def __init__(self, size: float) -> None:
-        self._size = size
-
-    def first_size(self, acceleration: Array) -> float:
-        """See `StepControl`."""
-        return self._size
-
-    def judge(self, attempt: Attempt) -> StepDecision:
-        """See `StepControl`."""
-        return StepDecision(self._size)
-
-    def reject(self, size: float, reason: str) -> StepDecision:
-        """See `StepControl`; no smaller step is tried."""
-        return StepDecision(0.0, reason)
-
-
 class ErrorMeasure(Protocol):
     """Compares the error of an attempt with what is allowed."""
 

@@ -1,4 +1,4 @@
-"""The loop of all methods that start from one state: try a step, judge it, keep it or try a smaller one."""
+"""Integrators that begin every step afresh: a method that computes a step, and control of its size."""
 
 from __future__ import annotations
 
@@ -7,60 +7,80 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import lu_factor, lu_solve
 
-from solver.integrators.base import Step, StepFailedError
+from solver.integrators.base import DifferentialEquation, InitialValueProblem, Step, StepFailedError
 from solver.integrators.control import Attempt, StepControl, root_mean_square
-from solver.motion.block_diagonal import BlockDiagonal
+from solver.motion.jacobian import Jacobian
 
 Array = NDArray[np.float64]
 
 
 class Linearization:
-    """The equation of motion near the state in which a step begins.
+    """A differential equation near the state in which a step begins.
 
     Parameters
     ----------
-    rate : callable
-        From a state (n,) to its rate of change (n,).
-    state, slope : (n,)
-        Where the step begins, and the rate there.
-    jacobian : (n, n) or BlockDiagonal
+    equation : DifferentialEquation
+    state : (n,) array
+        In which the step begins.
+    slope : (n,) array
+        The rate there.
+    jacobian : Jacobian
         The derivative of the rate there.
+
+    Attributes
+    ----------
+    factorizations : int
+        Number of matrices factorized.
     """
 
     def __init__(
-        self, rate: Callable[[Array], Array], state: Array, slope: Array, jacobian: Array | BlockDiagonal
+        self, equation: DifferentialEquation, state: Array, slope: Array, jacobian: Jacobian
     ) -> None:
-        self._rate = rate
+        self._equation = equation
         self.state = state
         self.slope = slope
         self.jacobian = jacobian
         self.factorizations = 0
 
     def rate(self, state: Array) -> Array:
-        """The rate in another state.
+        """Compute the rate in another state.
+
+        Parameters
+        ----------
+        state : (n,) array
+
+        Returns
+        -------
+        (n,) array
 
         Raises
         ------
         ArithmeticError
-            If there is none.
+            If it does not exist.
         """
         if not np.all(np.isfinite(state)):
             raise FloatingPointError("the state is no longer finite")
-        slope = self._rate(state)
+        slope = self._equation.rate(state)
         if not np.all(np.isfinite(slope)):
             raise FloatingPointError("the rate of change is not finite")
         return slope
 
     def solver(self, duration: float) -> Callable[[Array], Array]:
-        """Solve (I − duration·jacobian) x = b, from b (n,) to x (n,)."""
+        """Factorize I − duration·jacobian.
+
+        Parameters
+        ----------
+        duration : float
+            Part of a time step.
+
+        Returns
+        -------
+        callable
+            From a right-hand side (n,) to the solution (n,).
+        """
         self.factorizations += 1
-        if isinstance(self.jacobian, BlockDiagonal):
-            return self.jacobian.solver(duration)
-        matrix = np.eye(len(self.state)) - duration * self.jacobian
-        factors = lu_factor(matrix, overwrite_a=True, check_finite=False)
-        return lambda right: np.asarray(lu_solve(factors, right, check_finite=False))
+        return self.jacobian.solver(duration)
 
 
 class OneStepMethod(Protocol):
@@ -68,6 +88,17 @@ class OneStepMethod(Protocol):
 
     def attempt(self, near: Linearization, size: float) -> Attempt:
         """Try a step.
+
+        Parameters
+        ----------
+        near : Linearization
+            Where the step begins.
+        size : float
+            Its duration.
+
+        Returns
+        -------
+        Attempt
 
         Raises
         ------
@@ -83,38 +114,28 @@ class OneStepIntegrator:
     ----------
     method : OneStepMethod
     control : StepControl
-    rate, jacobian : callable
-        From a state (n,) to its rate of change (n,), and to the derivative of that, (n, n) or BlockDiagonal.
-    state : (n,)
-        Where the first step begins.
-    end, start : float
-        When the last step ends and the first begins.
+    problem : InitialValueProblem
     """
 
-    def __init__(
-        self,
-        method: OneStepMethod,
-        control: StepControl,
-        rate: Callable[[Array], Array],
-        jacobian: Callable[[Array], Array] | Callable[[Array], BlockDiagonal],
-        state: Array,
-        end: float,
-        start: float = 0.0,
-    ) -> None:
+    def __init__(self, method: OneStepMethod, control: StepControl, problem: InitialValueProblem) -> None:
         self.jacobian_evaluations = 0
         self.factorizations = 0
         self._method = method
         self._control = control
-        self._rate = rate
-        self._jacobian = jacobian
-        self._time = start
-        self._end = end
-        self._state = state
+        self._equation = problem.equation
+        self._time = problem.start
+        self._end = problem.end
+        self._state = problem.state
         self._slope: Array | None = None
         self._size: float | None = None
 
     def step(self) -> Step:
-        """See `Integrator`."""
+        """Take one step; see `Integrator`.
+
+        Returns
+        -------
+        Step
+        """
         start = self._time
         near = self._linearize()
         if self._size is None:
@@ -126,15 +147,15 @@ class OneStepIntegrator:
             try:
                 attempt = self._method.attempt(near, size)
             except ArithmeticError as error:
-                verdict = self._control.reject(size, str(error))
+                decision = self._control.reject(size, str(error))
             else:
-                verdict = self._control.judge(attempt)
-            self._size = verdict.size
-            if verdict.rejection is None:
+                decision = self._control.judge(attempt)
+            self._size = decision.size
+            if decision.rejection is None:
                 break
             shortened = True
             if self._size < 16 * np.spacing(self._end):
-                raise StepFailedError(f"no step size suffices at time {start:g}: {verdict.rejection}")
+                raise StepFailedError(f"no step size suffices at time {start:g}: {decision.rejection}")
         self.factorizations += near.factorizations
         self._time = self._end if last else start + size
         self._state, self._slope = attempt.after, attempt.slope
@@ -148,7 +169,7 @@ class OneStepIntegrator:
         )
 
     def _linearize(self) -> Linearization:
-        matrix = self._jacobian(self._state)
+        jacobian = self._equation.jacobian(self._state)
         self.jacobian_evaluations += 1
-        slope = self._rate(self._state) if self._slope is None else self._slope
-        return Linearization(self._rate, self._state, slope, matrix)
+        slope = self._equation.rate(self._state) if self._slope is None else self._slope
+        return Linearization(self._equation, self._state, slope, jacobian)

@@ -8,7 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.integrators.rosenbrock import Tableau
+from solver.integrators.base import InitialValueProblem, Integrator, register
+from solver.integrators.control import AdaptiveStep, EmbeddedError
+from solver.integrators.one_step import OneStepIntegrator
+from solver.integrators.rosenbrock import Rosenbrock, Tableau
+from solver.scene import Numerics
 
 _STAGE = np.zeros((8, 8))
 _STAGE[1, :1] = [3.0]
@@ -91,3 +95,21 @@ _DENSE = [
 RODAS5P = Tableau(
     order=5, diagonal=0.21193756319429014, stage=_STAGE, coupling=_COUPLING, dense=np.array(_DENSE)
 )
+
+
+@register("rosenbrock")
+def rodas5p(problem: InitialValueProblem, numerics: Numerics) -> Integrator:
+    """Make the Rosenbrock method that a scene asks for.
+
+    Parameters
+    ----------
+    problem : InitialValueProblem
+        With the exact Jacobian.
+    numerics : Numerics
+
+    Returns
+    -------
+    Integrator
+    """
+    control = AdaptiveStep(EmbeddedError(numerics.tolerance, RODAS5P.order), numerics.tolerance)
+    return OneStepIntegrator(Rosenbrock(RODAS5P), control, problem)

@@ -14,11 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import KroghInterpolator
 
+from solver.integrators.base import InitialValueProblem, Integrator, register
 from solver.integrators.collocation import GaussLobatto
-from solver.integrators.control import Attempt
-from solver.integrators.one_step import Linearization
+from solver.integrators.control import AdaptiveStep, Attempt, ConservedError, EmbeddedError, ErrorMeasure
+from solver.integrators.one_step import Linearization, OneStepIntegrator
+from solver.scene import Numerics
 
 Array = NDArray[np.float64]
+
+# Where a scene does not say: the least work for errors from 1e-3 to 1e-5.
+_USUAL_ORDER = 4
 
 
 def node_count(order: int) -> int:
@@ -110,3 +115,45 @@ class DeferredCorrection:
             interpolate=lambda fraction: np.asarray(polynomial(fraction)),
             slope=slopes[-1],
         )
+
+
+def _of_order(order: int, problem: InitialValueProblem, numerics: Numerics) -> Integrator:
+    measure: ErrorMeasure
+    if numerics.step_control == "area-length":
+        measure = ConservedError(problem.equation.conserved, numerics.tolerance, problem.end, order)
+    else:
+        measure = EmbeddedError(numerics.tolerance, estimate_power(order))
+    control = AdaptiveStep(measure, numerics.tolerance)
+    return OneStepIntegrator(DeferredCorrection(order), control, problem)
+
+
+@register("sdc")
+def deferred_correction(problem: InitialValueProblem, numerics: Numerics) -> Integrator:
+    """Make the deferred correction that a scene asks for.
+
+    Parameters
+    ----------
+    problem : InitialValueProblem
+    numerics : Numerics
+
+    Returns
+    -------
+    Integrator
+    """
+    return _of_order(numerics.order or _USUAL_ORDER, problem, numerics)
+
+
+@register("imex-euler")
+def imex_euler(problem: InitialValueProblem, numerics: Numerics) -> Integrator:
+    """Make linearly implicit Euler, which is deferred correction of order 1 (Quaife et al. 2019, appendix A).
+
+    Parameters
+    ----------
+    problem : InitialValueProblem
+    numerics : Numerics
+
+    Returns
+    -------
+    Integrator
+    """
+    return _of_order(1, problem, numerics)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.compilation import compiled
+from solver.membrane import curve
 from solver.membrane.spectral import differentiation, integration
 from solver.membrane.symmetry import independent_vesicles
 from solver.scene import Scene, Vesicle
@@ -303,6 +304,12 @@ class Geometry:
     def radii(self) -> Array:
         """Of the circles about the centers that hold each vesicle's points, (M,)."""
         return np.asarray(_radii(self.points, self.centers))
+
+    @cached_property
+    def areas(self) -> Array:
+        """Enclosed by each vesicle, (M,)."""
+        points, tangents = self.points.swapaxes(0, 1), self.tangents.swapaxes(0, 1)
+        return curve.area(points, tangents, self.membranes.length)
 
     @cached_property
     def curvature(self) -> Array:

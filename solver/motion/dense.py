@@ -1,11 +1,11 @@
-"""The equation of motion: how tangent angles and centers change.
+"""The equation of motion of few vesicles, with matrices over all points.
 
-The membranes move with the fluid, u = u_∞ + S[f_bending + f_adhesion + f_tension], and do not stretch.  In
-tangent angle and center that reads θ_t = n · u_s and c_t = mean(u).  Where the fluid inside a vesicle has
-another viscosity than that outside, both terms of u are changed (`contrast`).
+The membranes move with the fluid, u = u_∞ + S[f_bending + f_adhesion + f_tension], and do not stretch (Quaife
+et al. 2019, appendix A).  Where the fluid inside a vesicle has another viscosity than that outside, both
+terms of u are changed (`ViscosityContrast`).
 
-`DenseEquation.of` is the one place where a scene becomes the terms that it has.  What a scene does not have is
-never constructed.
+`DenseEquation.of` is the one place where a scene becomes the terms that it has.  What a scene does not have
+is never constructed.
 """
 
 from __future__ import annotations
@@ -19,62 +19,32 @@ from numpy.typing import NDArray
 from solver.flows import ImposedFlow
 from solver.forces.adhesion import Adhesion
 from solver.forces.bending import Bending
-from solver.forces.tension import ROUND_OFF, Inextensibility
+from solver.forces.tension import ROUND_OFF, Inextensibility, TensionInverse
 from solver.forces.truncated_adhesion import TruncatedAdhesion
 from solver.membrane.geometry import Geometry, Membranes
 from solver.membrane.spectral import differentiation, highest_modes, integration
 from solver.membrane.symmetry import independent_vesicles
 from solver.membrane.tangential_velocity import (
-    add_tangential_motion,
     tangential_speed,
     tangential_speed_by_curvature,
     tangential_speed_weights,
 )
+from solver.motion.equation import Motion, accuracy_of, conserved_quantities
+from solver.motion.jacobian import DenseJacobian
 from solver.parallel import SERIAL, Parallel
-from solver.potentials.proximity import Closeness, Proximity
+from solver.potentials.proximity import Closeness
 from solver.potentials.single_layer import SingleLayer
 from solver.potentials.viscosity_contrast import ViscosityContrast, contrasts
 from solver.scene import Adhesion as AdhesionParameters
-from solver.scene import Numerics, Scene
+from solver.scene import Scene
 
 Array = NDArray[np.float64]
-
-
-def accuracy_of(numerics: Numerics) -> float:
-    """Of sums and iterations; so far below the time integrator's that they do not limit its step."""
-    return float(np.clip(1e-3 * numerics.tolerance, 1e-12, 1e-7))
-
-
-@dataclass(frozen=True)
-class Motion:
-    """Everything known about one instant.
-
-    velocity : (2, M, N); turning : n · u_s, (M, N); tension : (M, N)
-    bending, adhesion : force densities (2, M, N)
-    closeness : None for a single curve; adhesion : None for a scene without
-    """
-
-    geometry: Geometry
-    closeness: Proximity | None
-    velocity: Array
-    rotation_rate: Array
-    tension: Array
-    bending: Array
-    adhesion: Array | None
-
-
-def state_change(motion: Motion) -> Array:
-    """How a state changes whose motion this is, (state_size,); see `DenseEquation.rate`."""
-    rotation_rate = motion.rotation_rate.copy()
-    points = rotation_rate.shape[1]
-    add_tangential_motion(motion.geometry.curvature, rotation_rate, highest_modes(points))
-    return np.concatenate([rotation_rate.ravel(), motion.velocity.sum(axis=2).ravel() / points])
 
 
 def _adhesion(
     parameters: AdhesionParameters | None, accuracy: float, membranes: Membranes, parallel: Parallel
 ) -> Adhesion | None:
-    """The adhesion that several vesicles have."""
+    """Make the adhesion that several vesicles have."""
     if parameters is None:
         return None
     if parameters.cutoff is not None:
@@ -84,9 +54,25 @@ def _adhesion(
 
 @dataclass
 class DenseEquation:
-    """Right-hand side and Jacobian of the equation of motion.
+    """The equation of motion with its exact Jacobian; see `EquationOfMotion`.
 
-    ``adhesion``, ``flow`` and ``contrast`` are None for a scene without.
+    Parameters
+    ----------
+    membranes : Membranes
+    bending : Bending
+    adhesion : Adhesion or None
+        None for a scene without, and for a single vesicle.
+    flow : ImposedFlow or None
+        None in a quiescent fluid.
+    inextensibility : Inextensibility
+    layer : SingleLayer
+    contrast : ViscosityContrast or None
+        None if all viscosities are equal.
+
+    Attributes
+    ----------
+    evaluations, recordings : int
+        See `EquationOfMotion`.
     """
 
     membranes: Membranes
@@ -97,10 +83,25 @@ class DenseEquation:
     layer: SingleLayer
     contrast: ViscosityContrast | None = None
     evaluations: int = field(default=0, init=False)
+    recordings: int = field(default=0, init=False)
+    _inverse: TensionInverse | None = field(default=None, init=False)
+    _assembled: tuple[Geometry, Closeness | None] | None = field(default=None, init=False)
 
     @classmethod
     def of(cls, scene: Scene, parallel: Parallel = SERIAL) -> Self:
-        """The terms of a scene, computed together by these ranks."""
+        """Make the terms that a scene has.
+
+        Parameters
+        ----------
+        scene : Scene
+            Its number of points is given.
+        parallel : Parallel
+            The ranks that compute the terms together.
+
+        Returns
+        -------
+        DenseEquation
+        """
         membranes = Membranes.of_scene(scene)
         several = membranes.curves > 1
         accuracy = accuracy_of(scene.numerics)
@@ -116,56 +117,96 @@ class DenseEquation:
             contrast=ViscosityContrast(contrast, membranes, accuracy) if differ else None,
         )
 
+    @property
+    def tension_iterations(self) -> int:
+        """Iterations of the search for the tension so far."""
+        return self.inextensibility.iterations
+
     def motion(self, state: Array) -> Motion:
-        """Velocity, tension and forces in a state."""
-        self.evaluations += 1
-        geometry, closeness = self._assemble(state)
-        bending = self.bending.density(geometry)
-        density = bending
-        adhesion = None
-        if self.adhesion and closeness:
-            adhesion = self.adhesion.density(geometry, closeness)
-            density = bending + adhesion
-        velocity = self.layer.velocity(density * self.membranes.spacing[:, None])
-        if self.flow:
-            velocity += self.flow.velocity(geometry.points, geometry.curve_centers)
-        if self.contrast:
-            velocity = self.contrast.velocity(velocity)
-        free = self.inextensibility.solve(self.contrast or self.layer, geometry, velocity)
-        return Motion(geometry, closeness, free.velocity, free.rotation_rate, free.tension, bending, adhesion)
+        """Compute velocity, tension and forces in a state; see `EquationOfMotion`.
+
+        Parameters
+        ----------
+        state : (state_size,) array
+
+        Returns
+        -------
+        Motion
+        """
+        self.recordings += 1
+        motion, _ = self._evaluate(state)
+        return motion
 
     def rate(self, state: Array) -> Array:
-        """d(state)/dt.
+        """Compute d(state)/dt for a step; see `EquationOfMotion`.
 
-        The two highest modes of the tangent angle stay as they are: their tangents alias onto a mode whose
-        derivative vanishes, so that bending does not damp them and gliding would slowly fill them.
+        Parameters
+        ----------
+        state : (state_size,) array
+
+        Returns
+        -------
+        (state_size,) array
         """
-        return self.rate_of(self.motion(state))
+        self.evaluations += 1
+        motion, self._inverse = self._evaluate(state)
+        return motion.rate
 
-    def rate_of(self, motion: Motion) -> Array:
-        """`rate` in the state of a motion."""
-        return state_change(motion)
-
-    def jacobian(self, state: Array) -> Array:
-        """Derivative of `rate`, (state_size, state_size).
+    def jacobian(self, state: Array) -> DenseJacobian:
+        """Compute the derivative of `rate` by the state, for a step.
 
         Dropped is only the change of a refined quadrature with the points.
+
+        Parameters
+        ----------
+        state : (state_size,) array
+
+        Returns
+        -------
+        DenseJacobian
         """
-        motion = self.motion(state)
+        self.evaluations += 1
+        motion, self._inverse = self._evaluate(state)
         geometry = motion.geometry
         adhesion = None
         if self.adhesion and motion.closeness:
             adhesion = self.adhesion.jacobian(geometry, motion.closeness)
-        return self.linearized(motion, adhesion)
+        matrix, self._inverse = self.linearize(motion, adhesion)
+        return DenseJacobian(matrix)
 
-    def linearized(self, motion: Motion, adhesion: Array | None) -> Array:
-        """`jacobian` in the state of a motion, whose geometry was the last one assembled.
+    def conserved(self, state: Array) -> Array:
+        """Return quantities of order 1 that the exact motion keeps; see `EquationOfMotion`.
 
-        ``adhesion``, (2, M·N, state), are the derivatives of its force density by the state, if there is any.
+        Parameters
+        ----------
+        state : (state_size,) array
+
+        Returns
+        -------
+        (3·M,) array
+        """
+        return conserved_quantities(Geometry(self.membranes, state))
+
+    def linearize(self, motion: Motion, adhesion: Array | None) -> tuple[Array, TensionInverse]:
+        """Compute the derivative of `Motion.rate` by the state.
+
+        Parameters
+        ----------
+        motion : Motion
+            In that state.
+        adhesion : (2, M·N, state_size) array or None
+            Derivative of its force per length by the state; None if there is no adhesion.
+
+        Returns
+        -------
+        (state_size, state_size) array
+        TensionInverse
+            In this geometry.
         """
         geometry = motion.geometry
+        self._assemble(geometry)
         force = self.bending.jacobian(geometry)
-        self._add_tension_turning(motion, force)
+        self._add_rotation_of_tension(motion, force)
         if adhesion is not None:
             force += adhesion
         weights = np.repeat(self.membranes.spacing, self.membranes.points)[:, None]
@@ -182,39 +223,36 @@ class DenseEquation:
         stretching[every_point, every_point] += motion.rotation_rate.ravel()
         stretching *= weights
         inverse, tension_flow = self.inextensibility.factorize(self.contrast or self.layer, geometry)
-        velocity += tension_flow @ (inverse @ stretching)
-        return self._rate_columns(motion, velocity)
+        velocity += tension_flow @ (inverse.matrix @ stretching)
+        return self._rate_columns(motion, velocity), inverse
 
-    def _point_forces(self, motion: Motion) -> Array:
-        """All forces at the points, (2, M, N)."""
-        geometry = motion.geometry
-        density = motion.bending + geometry.arclength_derivative(motion.tension * geometry.tangents)
-        if motion.adhesion is not None:
-            density += motion.adhesion
-        return density * self.membranes.spacing[:, None]
+    def tension_inverse(self, geometry: Geometry) -> TensionInverse:
+        """Compute the inverse that preconditions the search for the tension.
 
-    def _add_tension_turning(self, motion: Motion, force: Array) -> None:
-        """Add what turning a membrane does to its tension's force, ∂/∂s (σ n δθ)."""
-        points = self.membranes.points
-        matrix = differentiation(points)
-        geometry = motion.geometry
-        for vesicle in range(self.membranes.count):
-            block = slice(vesicle * points, (vesicle + 1) * points)
-            scaled = motion.tension[vesicle] * (2 * np.pi / self.membranes.length[vesicle])
-            tx, ty = geometry.tangents[:, vesicle]
-            force[0, block, block] -= matrix * (scaled * ty)
-            force[1, block, block] += matrix * (scaled * tx)
+        Parameters
+        ----------
+        geometry : Geometry
 
-    def _assemble(self, state: Array) -> tuple[Geometry, Closeness | None]:
-        geometry = Geometry(self.membranes, state)
-        closeness = Closeness(geometry) if self.membranes.curves > 1 else None
-        self.layer.assemble(geometry, closeness)
-        if self.contrast:
-            self.contrast.assemble(geometry, closeness, self.layer)
-        return geometry, closeness
+        Returns
+        -------
+        TensionInverse
+            In this geometry.
+        """
+        self._assemble(geometry)
+        inverse, _ = self.inextensibility.factorize(self.contrast or self.layer, geometry)
+        return inverse
 
     def point_derivatives(self, geometry: Geometry) -> Array:
-        """Derivatives of the points by the state, (2, M·N, state)."""
+        """Compute the derivatives of the points by the state.
+
+        Parameters
+        ----------
+        geometry : Geometry
+
+        Returns
+        -------
+        (2, M·N, state_size) array
+        """
         count, points = self.membranes.count, self.membranes.points
         by_state = np.zeros((2, count * points, self.membranes.state_size))
         matrix = integration(points)
@@ -227,8 +265,61 @@ class DenseEquation:
             by_state[1, block, count * points + count + vesicle] = 1.0
         return by_state
 
+    def _evaluate(self, state: Array) -> tuple[Motion, TensionInverse]:
+        """Compute the motion in a state, and the inverse that served to find its tension."""
+        geometry = Geometry(self.membranes, state)
+        closeness = self._assemble(geometry)
+        bending = self.bending.density(geometry)
+        density = bending
+        adhesion = None
+        if self.adhesion and closeness:
+            adhesion = self.adhesion.density(geometry, closeness)
+            density = bending + adhesion
+        velocity = self.layer.velocity(density * self.membranes.spacing[:, None])
+        if self.flow:
+            velocity += self.flow.velocity(geometry.points, geometry.curve_centers)
+        if self.contrast:
+            velocity = self.contrast.velocity(velocity)
+        mobility = self.contrast or self.layer
+        free, inverse = self.inextensibility.solve(mobility, geometry, velocity, self._inverse)
+        motion = Motion(
+            geometry, closeness, free.velocity, free.rotation_rate, free.tension, bending, adhesion
+        )
+        return motion, inverse
+
+    def _assemble(self, geometry: Geometry) -> Closeness | None:
+        """Fill the matrices for a geometry, unless they are filled for it already."""
+        if self._assembled is None or self._assembled[0] is not geometry:
+            closeness = Closeness(geometry) if self.membranes.curves > 1 else None
+            self._assembled = None
+            self.layer.assemble(geometry, closeness)
+            if self.contrast:
+                self.contrast.assemble(geometry, closeness, self.layer)
+            self._assembled = geometry, closeness
+        return self._assembled[1]
+
+    def _point_forces(self, motion: Motion) -> Array:
+        """Return all forces at the points, (2, M, N)."""
+        geometry = motion.geometry
+        density = motion.bending + geometry.arclength_derivative(motion.tension * geometry.tangents)
+        if motion.adhesion is not None:
+            density += motion.adhesion
+        return density * self.membranes.spacing[:, None]
+
+    def _add_rotation_of_tension(self, motion: Motion, force: Array) -> None:
+        """Add how the tension's force changes when the membrane rotates, ∂/∂s (σ n δθ)."""
+        points = self.membranes.points
+        matrix = differentiation(points)
+        geometry = motion.geometry
+        for vesicle in range(self.membranes.count):
+            block = slice(vesicle * points, (vesicle + 1) * points)
+            scaled = motion.tension[vesicle] * (2 * np.pi / self.membranes.length[vesicle])
+            tx, ty = geometry.tangents[:, vesicle]
+            force[0, block, block] -= matrix * (scaled * ty)
+            force[1, block, block] += matrix * (scaled * tx)
+
     def _flow_jacobian(self, flow: ImposedFlow, geometry: Geometry) -> Array:
-        """Derivatives of the imposed velocity at the points by the state, (2, M·N, state)."""
+        """Return derivatives of the imposed velocity at the points by the state, (2, M·N, state_size)."""
         count, size = self.membranes.count, self.membranes.state_size
         centers_by_state = np.zeros((2, count, size))
         for component in range(2):
@@ -241,7 +332,7 @@ class DenseEquation:
         )
 
     def _rate_columns(self, motion: Motion, velocity: Array) -> Array:
-        """`rate_of` for the derivatives of the velocity by the state, (2, M·N, columns)."""
+        """Return `Motion.rate` for the derivatives of the velocity by the state, (2, M·N, columns)."""
         count, points = self.membranes.count, self.membranes.points
         geometry = motion.geometry
         result = np.empty((self.membranes.state_size, velocity.shape[2]))

@@ -1,15 +1,240 @@
-"""Which form of the equation of motion serves a scene: with a matrix over all points, or with sums."""
+"""The equation of motion, as recording, criteria and integrators see it.
+
+The membranes move with the fluid and do not stretch (Quaife et al. 2019, eq. 1).  The unknowns, the state,
+are the tangent angle θ at the points of each vesicle and the vesicle's center c:
+
+    θ_t = n · u_s,    c_t = mean(u).
+
+An equation may keep what its last evaluation found, to make the next one cheaper: an inverse that
+preconditions the search for the tension, or the tension with which that search begins.  Such a memory decides
+the last bits of what is computed.  So only `rate` and `jacobian`, which steps ask for, change it; `motion`,
+which recording asks for, reads it and leaves it as it is.  What is recorded never changes what is computed.
+"""
 
 from __future__ import annotations
 
-from solver.motion.dense import DenseEquation
-from solver.motion.summed import SummedEquation
-from solver.parallel import Parallel
-from solver.scene import Scene
+from dataclasses import dataclass
+from typing import Protocol
 
-EquationOfMotion = DenseEquation | SummedEquation
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.forces.bending import Bending
+from solver.membrane.geometry import Geometry, Membranes
+from solver.membrane.spectral import highest_modes
+from solver.membrane.tangential_velocity import add_tangential_motion
+from solver.motion.jacobian import Jacobian
+from solver.potentials.proximity import Proximity
+from solver.potentials.viscosity_contrast import ViscosityContrast
+from solver.scene import Numerics
+
+Array = NDArray[np.float64]
 
 
-def equation_of_motion(scene: Scene, parallel: Parallel) -> EquationOfMotion:
-    """The terms of a scene, computed together by these ranks."""
-    return SummedEquation.of(scene, parallel) if scene.many else DenseEquation.of(scene, parallel)
+def accuracy_of(numerics: Numerics) -> float:
+    """Return the relative error allowed in sums and iterations.
+
+    It is so far below the tolerance of the time integrator that it does not limit its steps.
+
+    Parameters
+    ----------
+    numerics : Numerics
+        Of the scene.
+
+    Returns
+    -------
+    float
+        A thousandth of the tolerance, but at least 1e-12 and at most 1e-7.
+    """
+    return float(np.clip(1e-3 * numerics.tolerance, 1e-12, 1e-7))
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Velocity, tension and forces in one state of M vesicles with N points each.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        Points and tangents in this state.
+    closeness : Proximity or None
+        Which membranes are close to which; None for a single curve.
+    velocity : (2, M, N) array
+        u at the points.
+    rotation_rate : (M, N) array
+        n · u_s, how fast the material turns.
+    tension : (M, N) array
+    bending : (2, M, N) array
+        Force per length.
+    adhesion : (2, M, N) array or None
+        Force per length; None for a scene without adhesion.
+    """
+
+    geometry: Geometry
+    closeness: Proximity | None
+    velocity: Array
+    rotation_rate: Array
+    tension: Array
+    bending: Array
+    adhesion: Array | None
+
+    @property
+    def rate(self) -> Array:
+        """d(state)/dt, (state_size,).
+
+        The two highest modes of the tangent angle stay as they are: their tangents alias onto a mode whose
+        derivative vanishes, so that bending does not damp them, and the tangential velocity of the points
+        would slowly fill them.
+        """
+        angle_rate = self.rotation_rate.copy()
+        points = angle_rate.shape[1]
+        add_tangential_motion(self.geometry.curvature, angle_rate, highest_modes(points))
+        return np.concatenate([angle_rate.ravel(), self.velocity.sum(axis=2).ravel() / points])
+
+
+class AdhesionEnergy(Protocol):
+    """What recording asks of the adhesion between vesicles."""
+
+    def energy(self, geometry: Geometry, closeness: Proximity) -> float:
+        """Return the adhesion energy of all pairs of vesicles.
+
+        Parameters
+        ----------
+        geometry : Geometry
+        closeness : Proximity
+            Of this geometry.
+
+        Returns
+        -------
+        float
+        """
+
+    def sum_error(self, closeness: Proximity) -> float:
+        """Return the relative error of the force between the closest membranes.
+
+        Parameters
+        ----------
+        closeness : Proximity
+
+        Returns
+        -------
+        float
+        """
+
+
+class EquationOfMotion(Protocol):
+    """How tangent angles and centers change; the two forms are `DenseEquation` and `SummedEquation`.
+
+    Attributes
+    ----------
+    evaluations : int
+        How often velocity, tension and forces were computed for `rate` and `jacobian`.
+    recordings : int
+        How often they were computed for `motion`.
+    """
+
+    evaluations: int
+    recordings: int
+
+    @property
+    def membranes(self) -> Membranes:
+        """What stays the same during a run."""
+
+    @property
+    def bending(self) -> Bending:
+        """The bending forces."""
+
+    @property
+    def adhesion(self) -> AdhesionEnergy | None:
+        """The adhesion between vesicles; None for a scene without."""
+
+    @property
+    def contrast(self) -> ViscosityContrast | None:
+        """What other viscosities inside the vesicles change; None if all are that of the fluid outside."""
+
+    @property
+    def tension_iterations(self) -> int:
+        """Iterations of the search for the tension so far, of steps and recordings together."""
+
+    def motion(self, state: Array) -> Motion:
+        """Compute velocity, tension and forces in a state, without any effect on later calls.
+
+        Parameters
+        ----------
+        state : (state_size,) array
+
+        Returns
+        -------
+        Motion
+
+        Raises
+        ------
+        TensionNotFoundError
+            If the membranes are too distorted.
+        """
+
+    def rate(self, state: Array) -> Array:
+        """Compute d(state)/dt for a step.
+
+        Parameters
+        ----------
+        state : (state_size,) array
+
+        Returns
+        -------
+        (state_size,) array
+            See `Motion.rate`.
+
+        Raises
+        ------
+        TensionNotFoundError
+            If the membranes are too distorted.
+        """
+
+    def jacobian(self, state: Array) -> Jacobian:
+        """Compute the derivative of `rate` by the state, for a step.
+
+        Parameters
+        ----------
+        state : (state_size,) array
+
+        Returns
+        -------
+        Jacobian
+            Exact or close to it, as the form of the equation says.
+
+        Raises
+        ------
+        TensionNotFoundError
+            If the membranes are too distorted.
+        """
+
+    def conserved(self, state: Array) -> Array:
+        """Return quantities of order 1 that the exact motion keeps.
+
+        Parameters
+        ----------
+        state : (state_size,) array
+
+        Returns
+        -------
+        (3·M,) array
+            See `conserved_quantities`.
+        """
+
+
+def conserved_quantities(geometry: Geometry) -> Array:
+    """Return the reduced area of each vesicle, and how far each curve is from closing, over its length.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        Of M vesicles.
+
+    Returns
+    -------
+    (3·M,) array
+        Reduced areas 4π·area/length², then the mean tangents, x and y.
+    """
+    reduced_areas = 4 * np.pi * geometry.areas / geometry.membranes.length**2
+    return np.concatenate([reduced_areas, geometry.tangents.mean(axis=2).ravel()])

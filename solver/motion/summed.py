@@ -1,10 +1,10 @@
-"""The equation of motion of many vesicles; see `solver.motion.dense`."""
+"""The equation of motion of many vesicles, with sums instead of matrices over all points."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +13,12 @@ from solver.flows import ImposedFlow
 from solver.forces.bending import Bending
 from solver.forces.summed_adhesion import SummedAdhesion
 from solver.forces.summed_tension import Preconditioner, SummedInextensibility
-from solver.forces.tension import Inextensibility, TensionNotFoundError
+from solver.forces.tension import Inextensibility, TensionInverse, TensionNotFoundError
 from solver.forces.truncated_adhesion import TruncatedAdhesion
 from solver.membrane.geometry import Geometry, Membranes
-from solver.motion.block_diagonal import BlockDiagonal
-from solver.motion.dense import DenseEquation, Motion, accuracy_of, state_change
+from solver.motion.dense import DenseEquation
+from solver.motion.equation import Motion, accuracy_of, conserved_quantities
+from solver.motion.jacobian import BlockDiagonal
 from solver.parallel import Parallel, Shares
 from solver.potentials.neighbors import Neighbors
 from solver.potentials.summed_single_layer import SummedSingleLayer
@@ -30,7 +31,7 @@ Array = NDArray[np.float64]
 def _adhesion(
     parameters: AdhesionParameters | None, accuracy: float, membranes: Membranes, parallel: Parallel
 ) -> SummedAdhesion | TruncatedAdhesion | None:
-    """The adhesion that many vesicles have."""
+    """Make the adhesion that many vesicles have."""
     if parameters is None:
         return None
     if parameters.cutoff is not None:
@@ -38,11 +39,40 @@ def _adhesion(
     return SummedAdhesion(parameters, accuracy, parallel)
 
 
+class _Evaluation(NamedTuple):
+    """A state, the motion in it, and the preconditioner that served to find its tension."""
+
+    state: Array
+    motion: Motion
+    preconditioner: Preconditioner
+
+
 @dataclass
 class SummedEquation:
-    """Right-hand side of the equation of motion, and its Jacobian without what vesicles do to each other.
+    """The equation of motion, with a Jacobian without what vesicles do to each other.
 
-    ``adhesion`` and ``flow`` are None for a scene without.
+    See `EquationOfMotion`.
+
+    Parameters
+    ----------
+    scene : Scene
+    parallel : Parallel
+        The ranks that compute the terms together.
+    membranes : Membranes
+    bending : Bending
+    adhesion : SummedAdhesion or TruncatedAdhesion or None
+        None for a scene without.
+    flow : ImposedFlow or None
+        None in a quiescent fluid.
+    inextensibility : SummedInextensibility
+    layer : SummedSingleLayer
+
+    Attributes
+    ----------
+    contrast : None
+        Sums know no other viscosity inside the vesicles.
+    evaluations, recordings : int
+        See `EquationOfMotion`.
     """
 
     scene: Scene
@@ -53,13 +83,26 @@ class SummedEquation:
     flow: ImposedFlow | None
     inextensibility: SummedInextensibility
     layer: SummedSingleLayer
+    contrast: None = field(default=None, init=False)
     evaluations: int = field(default=0, init=False)
-    _preconditioner: Preconditioner | None = field(default=None, init=False)
-    _last: Motion | None = field(default=None, init=False)
+    recordings: int = field(default=0, init=False)
+    _last: _Evaluation | None = field(default=None, init=False)
 
     @classmethod
     def of(cls, scene: Scene, parallel: Parallel) -> Self:
-        """The terms of a scene, computed together by these ranks."""
+        """Make the terms that a scene has.
+
+        Parameters
+        ----------
+        scene : Scene
+            Its number of points is given.
+        parallel : Parallel
+            The ranks that compute the terms together.
+
+        Returns
+        -------
+        SummedEquation
+        """
         membranes = Membranes.of_scene(scene)
         accuracy = accuracy_of(scene.numerics)
         return cls(
@@ -75,116 +118,172 @@ class SummedEquation:
 
     @property
     def reach(self) -> float:
-        """Distance over spacing within which a term sees the points of a vesicle refined."""
+        """Distance over spacing within which a term needs the points of a vesicle refined."""
         return max(self.layer.ratio, self.adhesion.reach if self.adhesion else 0.0)
 
+    @property
+    def tension_iterations(self) -> int:
+        """Iterations of the search for the tension so far."""
+        return self.inextensibility.iterations
+
     def motion(self, state: Array) -> Motion:
-        """Velocity, tension and forces in a state."""
+        """Compute velocity, tension and forces in a state; see `EquationOfMotion`.
+
+        Parameters
+        ----------
+        state : (state_size,) array
+
+        Returns
+        -------
+        Motion
+        """
+        self.recordings += 1
+        return self._evaluate(state).motion
+
+    def rate(self, state: Array) -> Array:
+        """Compute d(state)/dt for a step; see `EquationOfMotion`.
+
+        Parameters
+        ----------
+        state : (state_size,) array
+
+        Returns
+        -------
+        (state_size,) array
+        """
         self.evaluations += 1
+        self._last = self._evaluate(state)
+        return self._last.motion.rate
+
+    def jacobian(self, state: Array) -> BlockDiagonal:
+        """Compute the derivative of each vesicle's `rate` by its own part of the state, the others at rest.
+
+        Parameters
+        ----------
+        state : (state_size,) array
+
+        Returns
+        -------
+        BlockDiagonal
+        """
+        if self._last is None or not np.array_equal(self._last.state, state):
+            self.evaluations += 1
+            self._last = self._evaluate(state)
+        motion = self._last.motion
+        assert motion.closeness is not None
+        count, points = self.membranes.count, self.membranes.points
+        stiffness = self.adhesion.stiffness(motion.geometry, motion.closeness) if self.adhesion else None
+        shares = self.parallel.divide(count)
+        mine = range(count)[shares.own]
+        blocks = np.empty((len(mine), points + 2, points + 2))
+
+        def linearize(isolated: DenseEquation, geometry: Geometry, vesicle: int) -> TensionInverse:
+            adhesion = None
+            if stiffness is not None:
+                adhesion = _by_state(stiffness[:, vesicle], isolated.point_derivatives(geometry))
+            part = _part(motion, geometry, vesicle)
+            blocks[vesicle - shares.own.start], inverse = isolated.linearize(part, adhesion)
+            return inverse
+
+        self._last = self._last._replace(
+            preconditioner=self._precondition(motion.geometry, shares, linearize)
+        )
+        angles = np.arange(count * points).reshape(count, points)
+        centers = count * points + np.arange(2 * count).reshape(2, count).T
+        return BlockDiagonal(blocks, np.concatenate([angles, centers], axis=1), shares)
+
+    def conserved(self, state: Array) -> Array:
+        """Return quantities of order 1 that the exact motion keeps; see `EquationOfMotion`.
+
+        Parameters
+        ----------
+        state : (state_size,) array
+
+        Returns
+        -------
+        (3·M,) array
+        """
+        return conserved_quantities(Geometry(self.membranes, state))
+
+    def _evaluate(self, state: Array) -> _Evaluation:
+        """Compute the motion in a state, with what the last evaluation for a step left."""
+        state = state.copy()  # the integrator may go on in its own array, and the evaluation is kept
         geometry = Geometry(self.membranes, state)
         neighbors = Neighbors(geometry, self.reach)
         self.layer.assemble(geometry, neighbors)
-        if self._preconditioner is None:
-            self._preconditioner = self._precondition(
-                geometry,
-                self.parallel.divide(self.membranes.count),
-                lambda alone, own, _: alone.inextensibility.factorize(alone.layer, own),
-            )
+        if self._last:
+            preconditioner, guess = self._last.preconditioner, self._last.motion.tension
+        else:
+            shares = self.parallel.divide(self.membranes.count)
+            preconditioner, guess = self._precondition(geometry, shares, _tension_inverse), None
         bending = self.bending.density(geometry)
         density, adhesion = bending, None
         if self.adhesion:
             adhesion = self.adhesion.density(geometry, neighbors)
             density = bending + adhesion
-        free = self.inextensibility.solve(
-            self.layer,
-            geometry,
-            self._preconditioner,
-            density,
-            self.flow.velocity(geometry.points, geometry.centers) if self.flow else None,
-        )
-        self._last = Motion(
+        flow = self.flow.velocity(geometry.points, geometry.centers) if self.flow else None
+        free = self.inextensibility.solve(self.layer, geometry, preconditioner, density, flow, guess)
+        motion = Motion(
             geometry, neighbors, free.velocity, free.rotation_rate, free.tension, bending, adhesion
         )
-        return self._last
-
-    def rate(self, state: Array) -> Array:
-        """d(state)/dt; see `DenseEquation.rate`."""
-        return state_change(self.motion(state))
-
-    def rate_of(self, motion: Motion) -> Array:
-        """`rate` in the state of a motion."""
-        return state_change(motion)
-
-    def jacobian(self, state: Array) -> BlockDiagonal:
-        """Each vesicle's part of `rate` by its own part of the state, while the others rest.
-
-        It is that of the last state whose motion was found: an implicit step asks for it close to that one.
-        """
-        motion = self._last or self.motion(state)
-        assert motion.closeness is not None
-        count, points = self.membranes.count, self.membranes.points
-        stiffness = self.adhesion.stiffness(motion.geometry, motion.closeness) if self.adhesion else None
-        shares = self.parallel.divide(count)
-        own = range(count)[shares.own]
-        blocks = np.empty((len(own), points + 2, points + 2))
-
-        def linearize(alone: DenseEquation, geometry: Geometry, k: int) -> None:
-            part = slice(own[k], own[k] + 1)
-            among_others = Motion(
-                geometry,
-                None,
-                motion.velocity[:, part],
-                motion.rotation_rate[part],
-                motion.tension[part],
-                motion.bending[:, part],
-                None if motion.adhesion is None else motion.adhesion[:, part],
-            )
-            by_state = alone.point_derivatives(geometry)
-            drawn = None if stiffness is None else _drawn(stiffness[:, own[k]], by_state)
-            blocks[k] = alone.linearized(among_others, drawn)
-
-        self._preconditioner = self._precondition(motion.geometry, shares, linearize)
-        angles = np.arange(count * points).reshape(count, points)
-        centers = count * points + np.arange(2 * count).reshape(2, count).T
-        return BlockDiagonal(blocks, np.concatenate([angles, centers], axis=1), shares)
+        return _Evaluation(state, motion, preconditioner)
 
     def _precondition(
-        self, geometry: Geometry, shares: Shares, factorize: Callable[[DenseEquation, Geometry, int], object]
+        self,
+        geometry: Geometry,
+        shares: Shares,
+        invert: Callable[[DenseEquation, Geometry, int], TensionInverse],
     ) -> Preconditioner:
-        """The preconditioner for the tension, after this rank's vesicles have been factorized one by one.
+        """Make the preconditioner for the tension from what ``invert`` returns of this rank's vesicles.
 
-        Collective, and so is a failure: where one rank's has one, all raise it.
+        ``invert`` is given a vesicle as if it were alone, its geometry and its number.  Collective, and so is
+        a failure: where one rank's ``invert`` fails, all raise the error.
         """
         count, points = self.membranes.count, self.membranes.points
-        own = range(count)[shares.own]
-        inverses, shifts = np.empty((len(own), points, points)), np.empty(len(own))
-        failed = np.zeros(len(own))
-        for k, vesicle in enumerate(own):
-            alone, its_geometry = self._alone(geometry, vesicle)
+        mine = range(count)[shares.own]
+        inverses, shifts = np.empty((len(mine), points, points)), np.empty(len(mine))
+        failed = np.zeros(len(mine))
+        for k, vesicle in enumerate(mine):
+            isolated, its_geometry = self._isolated(geometry, vesicle)
             try:
-                factorize(alone, its_geometry, k)
+                inverses[k], shifts[k] = invert(isolated, its_geometry, vesicle)
             except TensionNotFoundError:
                 failed[k] = 1.0
-                continue
-            inverses[k], shifts[k] = alone.inextensibility.inverse, alone.inextensibility.shift
         if (everywhere := shares.gather(failed)).any():
             vesicle = int(np.argmax(everywhere))
             raise TensionNotFoundError(f"the tension could not be found: vesicle {vesicle} is too distorted")
         return Preconditioner(shares.gather(inverses), shares.gather(shifts)[:, None])
 
-    def _alone(self, geometry: Geometry, vesicle: int) -> tuple[DenseEquation, Geometry]:
-        """A vesicle as if it were alone in the flow, its single layer assembled."""
+    def _isolated(self, geometry: Geometry, vesicle: int) -> tuple[DenseEquation, Geometry]:
+        """Return a vesicle as if it were alone in the flow, and its geometry."""
         scene = self.scene.model_copy(update={"vesicles": (self.scene.vesicles[vesicle],), "adhesion": None})
         accuracy = accuracy_of(scene.numerics)
-        alone = replace(DenseEquation.of(scene), inextensibility=Inextensibility(accuracy, 1e-3 * accuracy))
+        inextensibility = Inextensibility(accuracy, 1e-3 * accuracy)
+        isolated = replace(DenseEquation.of(scene), inextensibility=inextensibility)
         state = np.concatenate([geometry.tangent_angle[vesicle], geometry.centers[:, vesicle]])
-        own = Geometry(alone.membranes, state)
-        alone.layer.assemble(own, None)
-        return alone, own
+        return isolated, Geometry(isolated.membranes, state)
 
 
-def _drawn(stiffness: Array, by_state: Array) -> Array:
-    """Derivatives of the force on each point by the state, (2, N, state), from those by the point, (3, N)."""
+def _tension_inverse(isolated: DenseEquation, geometry: Geometry, _: int) -> TensionInverse:
+    return isolated.tension_inverse(geometry)
+
+
+def _part(motion: Motion, geometry: Geometry, vesicle: int) -> Motion:
+    """Return one vesicle's part of the motion of many."""
+    part = slice(vesicle, vesicle + 1)
+    return Motion(
+        geometry,
+        None,
+        motion.velocity[:, part],
+        motion.rotation_rate[part],
+        motion.tension[part],
+        motion.bending[:, part],
+        None if motion.adhesion is None else motion.adhesion[:, part],
+    )
+
+
+def _by_state(stiffness: Array, by_state: Array) -> Array:
+    """Return derivatives by the state, (2, N, state), from those of forces by their own point, (3, N)."""
     xx, xy, yy = stiffness[:, :, None]
     x, y = by_state
     return np.stack([xx * x + xy * y, xy * x + yy * y])

@@ -7,6 +7,10 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from solver.model import Model
+from solver.registry import RegisteredNames
+
+# "auto", and the names that the modules of `solver.integrators` register.
+INTEGRATORS = RegisteredNames("auto", "bdf", "rosenbrock", "sdc", "imex-euler")
 
 
 class Numerics(Model):
@@ -15,7 +19,7 @@ class Numerics(Model):
     # On each vesicle; "auto": as many as the tolerance needs, and more when a run comes to need them.
     points: Annotated[int, Field(ge=16, le=1024, multiple_of=2)] | Literal["auto"] = 64
     tolerance: float = Field(1e-4, ge=1e-12, le=0.1)  # local error of tangent angle and center, absolute
-    integrator: Literal["auto", "bdf", "rosenbrock", "sdc", "imex-euler"] = "auto"
+    integrator: Annotated[str, INTEGRATORS] = "auto"
     order: int | None = Field(None, ge=2, le=8)  # of "sdc"; None: its usual one
     # By the estimated error of each step, or as the paper: by the drift of areas and lengths over the run.
     step_control: Literal["embedded", "area-length"] = "embedded"

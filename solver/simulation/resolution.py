@@ -16,7 +16,7 @@ from solver.forces.adhesion import Adhesion
 from solver.membrane.geometry import Geometry, Membranes
 from solver.membrane.spectral import resampled, tail
 from solver.membrane.symmetry import independent_vesicles
-from solver.motion.dense import accuracy_of
+from solver.motion.equation import accuracy_of
 from solver.potentials.neighbors import Neighbors
 from solver.potentials.proximity import Closeness, waist_error
 from solver.potentials.refinement import MAXIMUM_FACTOR

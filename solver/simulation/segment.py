@@ -7,10 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.analysis.diagnostics import conserved_quantities
-from solver.integrators import Integrator, Step, integrator_for
-from solver.membrane.geometry import Geometry, Membranes
-from solver.motion.equation import equation_of_motion
+from solver.integrators import InitialValueProblem, Integrator, Step, integrator_for
+from solver.membrane.geometry import Membranes
+from solver.motion.form import equation_of_motion
 from solver.parallel import Parallel
 from solver.scene import Scene
 
@@ -18,9 +17,13 @@ Array = NDArray[np.float64]
 
 
 class SegmentWork(NamedTuple):
-    """What a run has cost so far."""
+    """What a run has cost so far.
+
+    ``evaluations`` are those for steps; ``recordings`` those for diagnostics and frames alone.
+    """
 
     evaluations: int = 0
+    recordings: int = 0
     jacobians: int = 0
     factorizations: int = 0
     tension_iterations: int = 0
@@ -52,17 +55,8 @@ class Segment:
 
     def begin(self, time: float, state: Array, latest: float) -> None:
         """Make the integrator that goes on from this state, until ``latest`` at most."""
-        self._integrator = integrator_for(
-            self._scene.numerics,
-            len(self._scene.vesicles),
-            self.dynamics.rate,
-            self.dynamics.jacobian,
-            lambda state: conserved_quantities(Geometry(self.membranes, state)),
-            state,
-            latest,
-            time,
-            block_diagonal=self._scene.many,
-        )
+        problem = InitialValueProblem(self.dynamics, state, time, latest)
+        self._integrator = integrator_for(problem, self._scene.numerics, len(self._scene.vesicles))
 
     def step(self) -> Step:
         """Take one step."""
@@ -75,7 +69,8 @@ class Segment:
         integrator = self._integrator
         return SegmentWork(
             self._before.evaluations + self.dynamics.evaluations,
+            self._before.recordings + self.dynamics.recordings,
             self._before.jacobians + (integrator.jacobian_evaluations if integrator else 0),
             self._before.factorizations + (integrator.factorizations if integrator else 0),
-            self._before.tension_iterations + self.dynamics.inextensibility.iterations,
+            self._before.tension_iterations + self.dynamics.tension_iterations,
         )

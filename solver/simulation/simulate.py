@@ -130,7 +130,7 @@ def simulate(
     work = Work(
         steps=progress.steps,
         rejected_steps=progress.rejected,
-        rhs_evaluations=start.evaluations + stage.cost.evaluations,
+        rhs_evaluations=start.evaluations + stage.cost.evaluations + stage.cost.recordings,
         jacobian_evaluations=stage.cost.jacobians,
         factorizations=stage.cost.factorizations,
         tension_iterations=stage.cost.tension_iterations,

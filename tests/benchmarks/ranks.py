@@ -21,7 +21,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from solver.motion.equation import equation_of_motion
+from solver.motion.form import equation_of_motion
 from solver.parallel import SERIAL, Parallel, Ranks
 from solver.scene import Scene
 from solver.simulation.initial_state import initial_ellipses

@@ -39,7 +39,7 @@ DOUBLET = shear_pair(3.5, numerics=Numerics(points=32, tolerance=1e-3))
 def linearized(scene: Scene, parallel: Parallel) -> tuple[Array, Array]:
     """Right-hand side and Jacobian where a scene begins."""
     dynamics, state = DenseEquation.of(scene, parallel), initial_ellipses(scene)
-    return dynamics.rate(state), dynamics.jacobian(state)
+    return dynamics.rate(state), dynamics.jacobian(state).matrix
 
 
 def summed(scene: Scene, parallel: Parallel) -> tuple[Array, Array]:
@@ -48,7 +48,7 @@ def summed(scene: Scene, parallel: Parallel) -> tuple[Array, Array]:
     motion = sums.motion(initial_ellipses(scene))
     assert sums.adhesion
     assert motion.closeness
-    return sums.rate_of(motion), np.array([sums.adhesion.energy(motion.geometry, motion.closeness)])
+    return motion.rate, np.array([sums.adhesion.energy(motion.geometry, motion.closeness)])
 
 
 def summary(run: Run) -> Array:

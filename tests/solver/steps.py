@@ -3,22 +3,54 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from solver.integrators import BackwardDifferentiation, Integrator, Step
-from solver.integrators.control import FixedStep, root_mean_square
+from solver.integrators import InitialValueProblem, Integrator, Step
+from solver.integrators.base import DifferentialEquation
+from solver.integrators.bdf import BackwardDifferentiation
+from solver.integrators.control import Attempt, StepDecision, root_mean_square
 from solver.integrators.one_step import OneStepIntegrator, OneStepMethod
 from solver.motion.dense import DenseEquation
+from solver.motion.jacobian import DenseJacobian
 from solver.scene import Numerics
 from solver.simulation.initial_state import initial_ellipses
 from tests.solver.scenes import shear_pair
 
 Array = NDArray[np.float64]
 Function = Callable[[Array], Array]
+
+
+@dataclass(frozen=True)
+class FunctionEquation:
+    """A differential equation given by functions; ``matrix`` returns the Jacobian as a matrix."""
+
+    rate: Function
+    matrix: Function
+    conserved: Function = lambda state: state[:1]
+
+    def jacobian(self, state: Array) -> DenseJacobian:
+        return DenseJacobian(self.matrix(state))
+
+
+class EqualSteps:
+    """The control that gives all steps the same size; a step that fails is not tried again."""
+
+    def __init__(self, size: float) -> None:
+        self._size = size
+
+    def first_size(self, acceleration: Array) -> float:
+        return self._size
+
+    def judge(self, attempt: Attempt) -> StepDecision:
+        return StepDecision(self._size)
+
+    def reject(self, size: float, reason: str) -> StepDecision:
+        return StepDecision(0.0, reason)
 
 
 def all_steps(integrator: Integrator, end: float) -> list[Step]:
@@ -32,12 +64,11 @@ def state_at(steps: list[Step], time: float) -> Array:
     return next(step.interpolate(time) for step in steps if time <= step.end)
 
 
-def fixed_steps(
-    method: OneStepMethod, rate: Function, jacobian: Function, state: Array, end: float, count: int
+def equal_steps(
+    method: OneStepMethod, equation: DifferentialEquation, state: Array, end: float, count: int
 ) -> list[Step]:
-    """Steps of equal size."""
-    control = FixedStep(end / count)
-    steps = all_steps(OneStepIntegrator(method, control, rate, jacobian, state, end), end)
+    problem = InitialValueProblem(equation, state, 0.0, end)
+    steps = all_steps(OneStepIntegrator(method, EqualSteps(end / count), problem), end)
     assert len(steps) == count
     return steps
 
@@ -51,6 +82,7 @@ def oscillator_jacobian(y: Array) -> Array:
     return np.array([[0.0, 1.0], [-2 * y[0] * y[1] - 1, 1 - y[0] ** 2]])
 
 
+OSCILLATOR_EQUATION = FunctionEquation(oscillator, oscillator_jacobian)
 OSCILLATOR_START, TIMES = np.array([2.0, 0.0]), np.linspace(0.0, 2.0, 201)
 OSCILLATOR = solve_ivp(
     lambda _, y: oscillator(y),
@@ -67,7 +99,7 @@ def oscillator_errors(
     method: OneStepMethod, count: int, jacobian: Function = oscillator_jacobian
 ) -> tuple[float, float]:
     """Error at the end, and the largest at any time, after steps of equal size."""
-    steps = fixed_steps(method, oscillator, jacobian, OSCILLATOR_START, 2.0, count)
+    steps = equal_steps(method, FunctionEquation(oscillator, jacobian), OSCILLATOR_START, 2.0, count)
     errors = [
         np.abs(state_at(steps, time) - exact).max() for time, exact in zip(TIMES, OSCILLATOR, strict=True)
     ]
@@ -79,11 +111,9 @@ def sheared_pair(begin: float) -> tuple[DenseEquation, Array, float]:
     """Adhering vesicles that have been in shear for some time, and the rate of their fastest mode."""
     scene = shear_pair(1.5, numerics=Numerics(points=32, tolerance=1e-9))
     dynamics = DenseEquation.of(scene)
-    integrator = BackwardDifferentiation(
-        dynamics.rate, dynamics.jacobian, initial_ellipses(scene), 1e-8, begin
-    )
-    state = all_steps(integrator, begin)[-1].state
-    return dynamics, state, float(-np.linalg.eigvals(dynamics.jacobian(state)).real.min())
+    problem = InitialValueProblem(dynamics, initial_ellipses(scene), 0.0, begin)
+    state = all_steps(BackwardDifferentiation(problem, 1e-8), begin)[-1].state
+    return dynamics, state, float(-np.linalg.eigvals(dynamics.jacobian(state).matrix).real.min())
 
 
 def pair_errors(
@@ -97,7 +127,7 @@ def pair_errors(
     dynamics, state, _ = sheared_pair(begin)
 
     def final(method: OneStepMethod, count: int) -> Array:
-        return fixed_steps(method, dynamics.rate, dynamics.jacobian, state, duration, count)[-1].state
+        return equal_steps(method, dynamics, state, duration, count)[-1].state
 
     reference = final(finest, 2 * max(counts))
     return np.array(
@@ -108,7 +138,8 @@ def pair_errors(
 def amplification(method: OneStepMethod, decay: float) -> float:
     """Of one unit step for y' = −decay·y."""
     matrix = np.array([[-decay]])
-    (step,) = fixed_steps(method, lambda y: matrix @ y, lambda _: matrix, np.ones(1), 1.0, 1)
+    equation = FunctionEquation(lambda y: matrix @ y, lambda _: matrix)
+    (step,) = equal_steps(method, equation, np.ones(1), 1.0, 1)
     return abs(float(step.state[0]))
 
 
@@ -124,5 +155,5 @@ def stiff_errors(method: OneStepMethod) -> Array:
     def jacobian(y: Array) -> Array:
         return np.array([[0.0, 0.0], [-1e6 * np.sin(y[0]) - np.cos(y[0]), -1e6]])
 
-    steps = fixed_steps(method, rate, jacobian, np.array([0.0, 1.0]), 2.0, 32)
+    steps = equal_steps(method, FunctionEquation(rate, jacobian), np.array([0.0, 1.0]), 2.0, 32)
     return np.array([abs(state_at(steps, time)[1] - np.cos(time)) for time in np.linspace(0.01, 2.0, 50)])

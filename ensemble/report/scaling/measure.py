@@ -14,7 +14,7 @@ from ensemble.report.scaling.counting import Counted
 from ensemble.report.scaling.profile import shares_of_time
 from ensemble.report.scaling.scaling_document import Collective
 from ensemble.report.scaling.scaling_plan import suspension
-from solver.motion.equation import equation_of_motion
+from solver.motion.form import equation_of_motion
 from solver.parallel import SERIAL, Array, Ranks
 from solver.potentials.direct_sum import velocity
 from solver.simulation.initial_state import initial_ellipses
@@ -69,7 +69,7 @@ def _evaluation(group: Intracomm, vesicles: int, repeats: int) -> Measured:
     states = (state + _TIME_BETWEEN_STATES * number * drift for number in range(1, repeats + 3))
     dynamics.rate(next(states))
     parallel.reset()
-    iterations = dynamics.inextensibility.iterations
+    iterations = dynamics.tension_iterations
     seconds = []
     for _ in range(repeats):
         moved = next(states)
@@ -79,7 +79,7 @@ def _evaluation(group: Intracomm, vesicles: int, repeats: int) -> Measured:
         seconds.append(time.perf_counter() - begun)
     gathers, gathered = parallel.gathers / repeats, parallel.gathered_bytes / repeats
     # Of the forces without tension, and in each iteration.
-    sums = 1 + (dynamics.inextensibility.iterations - iterations) / repeats
+    sums = 1 + (dynamics.tension_iterations - iterations) / repeats
     moved = next(states)
     shares = shares_of_time(lambda: dynamics.rate(moved))
     return Measured(min(seconds), shares, gathers, gathered, sums, rate)

@@ -8,21 +8,22 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from solver.analysis.outcome import Outcome
-from solver.integrators import BackwardDifferentiation, integrator_for
+from solver.integrators import InitialValueProblem, integrator_for
+from solver.integrators.bdf import BackwardDifferentiation
 from solver.integrators.control import root_mean_square
 from solver.integrators.one_step import OneStepIntegrator
 from solver.scene import Criteria, Numerics, Scene, Shear, Vesicle
 from solver.simulation.simulate import simulate
 from tests.solver.scenes import fixed_horizon, shear_pair
+from tests.solver.steps import FunctionEquation
 
 Array = NDArray[np.float64]
 
 
 @pytest.mark.parametrize(("vesicles", "expected"), [(1, OneStepIntegrator), (2, BackwardDifferentiation)])
 def test_one_vesicle_takes_long_steps_and_several_many(vesicles: int, expected: type) -> None:
-    found = integrator_for(
-        Numerics(), vesicles, lambda y: -y, lambda _: -np.eye(2), lambda y: y, np.ones(2), 1.0
-    )
+    equation = FunctionEquation(lambda y: -y, lambda _: -np.eye(2))
+    found = integrator_for(InitialValueProblem(equation, np.ones(2), 0.0, 1.0), Numerics(), vesicles)
     assert isinstance(found, expected)
 
 

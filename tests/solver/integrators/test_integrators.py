@@ -8,12 +8,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from solver.integrators import (
-    Integrator,
-    StepFailedError,
-    integrator_for,
-)
+from solver.integrators import InitialValueProblem, Integrator, StepFailedError, integrator_for
 from solver.scene import Numerics
+from tests.solver.steps import FunctionEquation
 
 Array = NDArray[np.float64]
 
@@ -44,7 +41,8 @@ def integrator(
     end: float,
 ) -> Integrator:
     numerics = method.model_copy(update={"tolerance": tolerance})
-    return integrator_for(numerics, 2, rate, lambda _: jacobian, lambda y: y[:1], start, end)
+    problem = InitialValueProblem(FunctionEquation(rate, lambda _: jacobian), start, 0.0, end)
+    return integrator_for(problem, numerics, 2)
 
 
 def rotation(method: Numerics, tolerance: float, end: float = 6.0) -> Integrator:
@@ -63,9 +61,8 @@ def final_error(method: Numerics, tolerance: float) -> tuple[float, int]:
 @every_method
 def test_it_begins_and_ends_when_told(method: Numerics) -> None:
     numerics = method.model_copy(update={"tolerance": 1e-6})
-    stepper = integrator_for(
-        numerics, 2, lambda y: MATRIX @ y, lambda _: MATRIX, lambda y: y[:1], exact(2.0), 6.0, start=2.0
-    )
+    equation = FunctionEquation(lambda y: MATRIX @ y, lambda _: MATRIX)
+    stepper = integrator_for(InitialValueProblem(equation, exact(2.0), 2.0, 6.0), numerics, 2)
     step = stepper.step()
     assert step.start == 2.0
     np.testing.assert_allclose(step.interpolate(2.0), exact(2.0), rtol=0, atol=1e-6)

@@ -10,11 +10,11 @@ from solver.integrators.rodas5p import RODAS5P
 from solver.integrators.rosenbrock import Rosenbrock
 from solver.integrators.sdc import DeferredCorrection
 from tests.solver.steps import (
+    OSCILLATOR_EQUATION,
     OSCILLATOR_START,
     amplification,
     oscillator,
     oscillator_errors,
-    oscillator_jacobian,
     pair_errors,
     sheared_pair,
     stiff_errors,
@@ -22,6 +22,11 @@ from tests.solver.steps import (
 
 Array = NDArray[np.float64]
 METHOD = Rosenbrock(RODAS5P)
+
+
+def at_the_start() -> Linearization:
+    state = OSCILLATOR_START
+    return Linearization(OSCILLATOR_EQUATION, state, oscillator(state), OSCILLATOR_EQUATION.jacobian(state))
 
 
 def test_order_five() -> None:
@@ -35,10 +40,7 @@ def test_dense_output_of_order_four() -> None:
 
 
 def test_dense_output_meets_the_ends() -> None:
-    near = Linearization(
-        oscillator, OSCILLATOR_START, oscillator(OSCILLATOR_START), oscillator_jacobian(OSCILLATOR_START)
-    )
-    attempt = METHOD.attempt(near, 0.1)
+    attempt = METHOD.attempt(at_the_start(), 0.1)
     np.testing.assert_allclose(attempt.interpolate(0.0), OSCILLATOR_START, rtol=0, atol=1e-15)
     np.testing.assert_allclose(attempt.interpolate(1.0), attempt.after, rtol=0, atol=1e-15)
 
@@ -46,10 +48,7 @@ def test_dense_output_meets_the_ends() -> None:
 def test_the_estimate_falls_as_the_fifth_power_of_the_step() -> None:
     estimates = []
     for size in (0.02, 0.01):
-        near = Linearization(
-            oscillator, OSCILLATOR_START, oscillator(OSCILLATOR_START), oscillator_jacobian(OSCILLATOR_START)
-        )
-        estimates.append(np.abs(METHOD.attempt(near, size).estimate).max())
+        estimates.append(np.abs(METHOD.attempt(at_the_start(), size).estimate).max())
     assert abs(np.log2(estimates[0] / estimates[1]) - RODAS5P.order) < 0.3
 
 

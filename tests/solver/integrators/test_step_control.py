@@ -6,16 +6,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from solver.analysis.diagnostics import conserved_quantities
-from solver.integrators import StepFailedError
-from solver.integrators.control import AdaptiveStep, Attempt, ConservedError, EmbeddedError, FixedStep
+from solver.integrators import InitialValueProblem, StepFailedError
+from solver.integrators.control import AdaptiveStep, Attempt, ConservedError, EmbeddedError
 from solver.integrators.one_step import OneStepIntegrator
 from solver.integrators.sdc import DeferredCorrection
-from solver.membrane.geometry import Geometry
 from solver.motion.dense import DenseEquation
 from solver.simulation.initial_state import initial_ellipses
 from tests.solver.scenes import uneven_pair
-from tests.solver.steps import all_steps
+from tests.solver.steps import EqualSteps, FunctionEquation, all_steps
 
 Array = NDArray[np.float64]
 
@@ -61,7 +59,7 @@ def test_a_gap_in_a_curve_counts_the_same_wherever_the_vesicle_is() -> None:
     state[:10] += 0.01
     far = state.copy()
     far[-4:] += 100.0
-    near, moved = (conserved_quantities(Geometry(dynamics.membranes, y)) for y in (state, far))
+    near, moved = (dynamics.conserved(y) for y in (state, far))
     np.testing.assert_allclose(moved, near, rtol=0, atol=1e-12)
     assert np.abs(near[2:]).max() > 1e-4
 
@@ -76,22 +74,16 @@ def test_a_rate_that_cannot_be_evaluated_shortens_the_step() -> None:
 
     jacobian = np.array([[1e-3]])  # wrong, so that long steps overshoot
     control = AdaptiveStep(EmbeddedError(0.1, power=3), 0.1)
-    integrator = OneStepIntegrator(
-        DeferredCorrection(3), control, rate, lambda _: jacobian, np.zeros(1), 30.0
-    )
+    problem = InitialValueProblem(FunctionEquation(rate, lambda _: jacobian), np.zeros(1), 0.0, 30.0)
+    integrator = OneStepIntegrator(DeferredCorrection(3), control, problem)
     steps = all_steps(integrator, 30.0)
     assert any(step.shortened for step in steps)
     assert steps[-1].state[0] == pytest.approx(0.9, abs=0.1)
 
 
-def test_a_fixed_step_fails_rather_than_shrinks() -> None:
-    integrator = OneStepIntegrator(
-        DeferredCorrection(2),
-        FixedStep(0.3),
-        lambda y: np.where(y > 1, np.nan, 1.0),
-        lambda _: np.zeros((1, 1)),
-        np.zeros(1),
-        2.0,
-    )
+def test_a_rejection_that_leaves_no_size_ends_the_run() -> None:
+    equation = FunctionEquation(lambda y: np.where(y > 1, np.nan, 1.0), lambda _: np.zeros((1, 1)))
+    problem = InitialValueProblem(equation, np.zeros(1), 0.0, 2.0)
+    integrator = OneStepIntegrator(DeferredCorrection(2), EqualSteps(0.3), problem)
     with pytest.raises(StepFailedError, match=r"at time 0\.9: the rate of change is not finite"):
         all_steps(integrator, 2.0)

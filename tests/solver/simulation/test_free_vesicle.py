@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import root
 
 from solver.analysis.outcome import Outcome
-from solver.integrators import integrator_for
+from solver.integrators import InitialValueProblem, integrator_for
 from solver.membrane.shapes import ellipse_tangent_angle, of_reduced_area
 from solver.motion.dense import DenseEquation
 from solver.scene import Criteria, Numerics, Scene, Vesicle
@@ -101,9 +101,8 @@ def test_a_slender_vesicle_relaxes_to_the_euler_lagrange_shape(reduced_area: flo
     dynamics = DenseEquation.of(scene)
     blunt = of_reduced_area(ellipse_tangent_angle(0.55, 2 * np.pi, 0.0, points), reduced_area)
     state = dynamics.membranes.pack(blunt[None], np.zeros((1, 2)))
-    integrator = integrator_for(
-        scene.numerics, 1, dynamics.rate, dynamics.jacobian, lambda y: y[:1], state, scene.horizon
-    )
+    problem = InitialValueProblem(dynamics, state, 0.0, scene.horizon)
+    integrator = integrator_for(problem, scene.numerics, 1)
     step = integrator.step()
     while step.end < scene.horizon:
         step = integrator.step()

@@ -1,0 +1,141 @@
+"""Jacobians of an equation of motion, and the linear systems that implicit steps solve with them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import lu_factor, lu_solve
+
+from solver.parallel import Shares
+
+Array = NDArray[np.float64]
+
+
+class Jacobian(Protocol):
+    """The derivative J of a rate by the state, exact or close to it.
+
+    Where several ranks share a run, all calls are collective.
+    """
+
+    def __matmul__(self, direction: Array) -> Array:
+        """Return J times a direction.
+
+        Parameters
+        ----------
+        direction : (n,) array
+
+        Returns
+        -------
+        (n,) array
+        """
+
+    def solver(self, duration: float) -> Callable[[Array], Array]:
+        """Factorize I − duration·J.
+
+        Parameters
+        ----------
+        duration : float
+            Part of a time step, as the implicit method has it.
+
+        Returns
+        -------
+        callable
+            From a right-hand side b (n,) to the solution x (n,) of (I − duration·J) x = b.
+        """
+
+
+@dataclass(frozen=True)
+class DenseJacobian:
+    """A Jacobian as a matrix.
+
+    Parameters
+    ----------
+    matrix : (n, n) array
+    """
+
+    matrix: Array
+
+    def __matmul__(self, direction: Array) -> Array:
+        """Return J times a direction.
+
+        Parameters
+        ----------
+        direction : (n,) array
+
+        Returns
+        -------
+        (n,) array
+        """
+        return np.asarray(self.matrix @ direction)
+
+    def solver(self, duration: float) -> Callable[[Array], Array]:
+        """Factorize I − duration·J; see `Jacobian`.
+
+        Parameters
+        ----------
+        duration : float
+            Part of a time step.
+
+        Returns
+        -------
+        callable
+            From a right-hand side (n,) to the solution (n,).
+        """
+        system = np.eye(len(self.matrix)) - duration * self.matrix
+        factors = lu_factor(system, overwrite_a=True, check_finite=False)
+        return lambda right: np.asarray(lu_solve(factors, right, check_finite=False))
+
+
+@dataclass(frozen=True)
+class BlockDiagonal:
+    """An approximate Jacobian without what the parts of a state do to each other.
+
+    Parameters
+    ----------
+    blocks : (m, n, n) array
+        One dense block for each of the m parts that are this rank's.
+    members : (M, n) array of int
+        The elements of the state that belong to each of all M parts; every element belongs to one part.
+    shares : Shares
+        How the parts are shared out among the ranks.
+    """
+
+    blocks: Array
+    members: NDArray[np.int64]
+    shares: Shares
+
+    def __matmul__(self, direction: Array) -> Array:
+        """Return J times a direction.  Collective.
+
+        Parameters
+        ----------
+        direction : (M·n,) array
+
+        Returns
+        -------
+        (M·n,) array
+        """
+        parts = direction[self.members[self.shares.own]]
+        result = np.empty_like(direction)
+        result[self.members] = self.shares.gather((self.blocks @ parts[:, :, None])[:, :, 0])
+        return result
+
+    def solver(self, duration: float) -> Callable[[Array], Array]:
+        """Invert the blocks of I − duration·J; see `Jacobian`.  Calls of the result are collective.
+
+        Parameters
+        ----------
+        duration : float
+            Part of a time step.
+
+        Returns
+        -------
+        callable
+            From a right-hand side (M·n,) to the solution (M·n,).
+        """
+        inverses = np.asarray(np.linalg.inv(np.eye(self.members.shape[1]) - duration * self.blocks))
+        return replace(self, blocks=inverses).__matmul__
