@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+
+# What file systems answer that do not flush directories (some network and user-space ones): their entries
+# are then as durable as the file system makes them.
+_NO_DIRECTORY_FLUSH = {errno.EINVAL, errno.ENOTSUP, errno.EBADF}
 
 
 def flush(path: Path) -> None:
@@ -15,11 +20,14 @@ def flush(path: Path) -> None:
     Parameters
     ----------
     path : Path
-        The file or directory.
+        The file or directory.  A file system that refuses to flush directories is accepted.
     """
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)
+    except OSError as error:
+        if error.errno not in _NO_DIRECTORY_FLUSH or not path.is_dir():
+            raise
     finally:
         os.close(descriptor)
 
@@ -45,10 +53,11 @@ def locked(path: Path) -> Iterator[None]:
     Parameters
     ----------
     path : Path
-        The lock file, which is created if it does not exist.
+        The lock file.  It is created if it does not exist, with the permissions that the umask leaves, so
+        that a group that shares a directory shares its locks.
     """
     # flock belongs to the open file, so each holder opens its own.
-    descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+    descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX)
         yield

@@ -21,6 +21,10 @@ class StoreError(EnsembleError):
     """Stored data are damaged or lost; the message says which and how."""
 
 
+class OtherVersionError(StoreError):
+    """A record that another version wrote and that this one cannot read."""
+
+
 class StoreInputError(BadInput, ValueError):
     """The named store, run, boundary or filter does not exist or is not valid; the message names it."""
 

@@ -2,8 +2,9 @@
 or a PostgreSQL server).
 
 A run is written to `staging/`, flushed to disk, renamed into `runs/` and then entered in the catalog.  Only
-that last step makes it exist, so a process may die at any moment: what it acknowledged is there, whole, and
-what it left behind is swept.  One lock file, held only for moments, keeps sweeping apart from committing.
+that last step makes it exist, so a process may die at any moment: what it acknowledged is there, whole.  What
+it left behind is adopted if it is a whole run (`recovery`).  One lock file, held only for moments, keeps
+recovery apart from committing.
 
 Names are imported on first use: a command that keeps nothing does not load the database library.
 """
@@ -17,11 +18,12 @@ from ensemble.errors import NotStored, StoreError, StoreInputError
 
 if TYPE_CHECKING:
     from ensemble.store.catalog import Record
-    from ensemble.store.store import Staged, Store
+    from ensemble.store.staging import RunStaging, Staged
+    from ensemble.store.store import Store
 
-__all__ = ["NotStored", "Record", "Staged", "Store", "StoreError", "StoreInputError"]
+__all__ = ["NotStored", "Record", "RunStaging", "Staged", "Store", "StoreError", "StoreInputError"]
 
-_MODULES = {"Record": "catalog", "Staged": "store", "Store": "store"}
+_MODULES = {"Record": "catalog", "RunStaging": "staging", "Staged": "staging", "Store": "store"}
 
 
 def __getattr__(name: str) -> Any:

@@ -11,8 +11,9 @@ from pydantic import ValidationError
 from zarr.codecs import ZstdCodec
 from zarr.storage import LocalStore
 
-from ensemble.errors import StoreError
-from ensemble.store.run_record import NamedArray, RunSummary, arrays, rebuild
+from ensemble.config.run_key import DISTRIBUTION
+from ensemble.errors import OtherVersionError, StoreError
+from ensemble.store.run_record import NamedArray, RunSummary, arrays, first_problem, rebuild
 from solver.analysis.run import Array, Run
 
 CHUNK_BYTES = 1 << 20
@@ -57,7 +58,13 @@ def _summary(directory: Path, group: zarr.Group) -> RunSummary:
     try:
         return RunSummary.model_validate(dict(group.attrs))
     except ValidationError as error:
-        raise StoreError(f"run {directory.name}: unreadable attributes ({error})") from error
+        written_by = dict(group.attrs).get("versions")
+        if isinstance(written_by, dict) and DISTRIBUTION in written_by:
+            raise OtherVersionError(
+                f"run {directory.name}: version {written_by[DISTRIBUTION]} wrote it and this version cannot "
+                f"read it ({first_problem(error)})"
+            ) from error
+        raise StoreError(f"run {directory.name}: unreadable attributes ({first_problem(error)})") from error
 
 
 def _reader(directory: Path, group: zarr.Group) -> Callable[[str], Array]:

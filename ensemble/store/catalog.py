@@ -6,13 +6,14 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from sqlalchemy import JSON, Executable, Text, bindparam, cast, delete, insert, select, tuple_
+from sqlalchemy.exc import DatabaseError
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 from sqlalchemy.schema import CreateSchema
 
 from ensemble.search.boundary import Boundary
 from ensemble.store.filters import conditions, model_fields
 from ensemble.store.run_record import RunSummary
-from ensemble.store.sql_database import Place, engine
+from ensemble.store.sql_database import Place, engine, reading_engine
 from ensemble.timestamp import timestamp_text
 from solver.scene import Scene
 
@@ -68,11 +69,49 @@ _ONE_BOUNDARY = _BOUNDARY.where(BoundaryRow.study_key == bindparam("key"))
 
 
 class Catalog:
-    """Committed runs and boundaries in a database, from any thread."""
+    """Committed runs and boundaries in a database, from any thread.
 
-    def __init__(self, place: Place) -> None:
+    Parameters
+    ----------
+    place : Place
+        Where the database is.
+    read_only : bool
+        Whether nothing is written: then no file appears beside that of the database.
+    """
+
+    def __init__(self, place: Place, read_only: bool = False) -> None:
         self._schema = place.schema_name
-        self._engine = engine(place.url).execution_options(schema_translate_map={None: place.schema_name})
+        # Not a write-ahead log: a store is copied, shared by a group and mounted read-only, and its readers
+        # must leave nothing behind.
+        made = reading_engine(place.url) if read_only else engine(place.url, journal="delete")
+        self._engine = made.execution_options(schema_translate_map={None: place.schema_name})
+
+    def require_writable(self) -> None:
+        """Raise a database error unless a row could be written now."""
+        with self._engine.begin() as connection:
+            # Changes nothing, and takes what a change takes: the lock, the journal and the permission.
+            connection.execute(delete(RunRow).where(RunRow.key == ""))
+
+    def require_whole(self) -> None:
+        """Raise a database error unless the tables can be read and SQLite finds its file undamaged."""
+        with self._engine.connect() as connection:
+            if self._engine.dialect.name == "sqlite":
+                (found,) = connection.exec_driver_sql("PRAGMA quick_check(1)").one()
+                if found != "ok":
+                    raise DatabaseError(None, None, ValueError(found))
+            for table in (RunRow, BoundaryRow):
+                connection.execute(select(table).limit(1))
+
+    def remove(self, key: str) -> None:
+        """Remove a run, so that it no longer exists.
+
+        Parameters
+        ----------
+        key : str
+            Of the run.
+        """
+        with self._engine.begin() as connection:
+            connection.execute(delete(RunRow).where(RunRow.key == key))
 
     def create(self) -> None:
         """Create the tables that are not there yet."""

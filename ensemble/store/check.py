@@ -34,7 +34,7 @@ def check_run(directory: Path, summary: RunSummary) -> list[str]:
         stored, run = read_summary(directory), read_run(directory)
     except StoreError as error:
         return [str(error)]
-    problems = [f"{name}: {problem}" for problem in _array_problems(run)]
+    problems = [f"{name}: {problem}" for problem in array_problems(run)]
     if stored.document() != summary.document():
         problems.append(f"{name}: its attributes differ from its row in the catalog")
     if summary.key != directory.name:
@@ -44,7 +44,19 @@ def check_run(directory: Path, summary: RunSummary) -> list[str]:
     return problems
 
 
-def _array_problems(run: Run) -> list[str]:
+def array_problems(run: Run) -> list[str]:
+    """Compare the arrays of a run with what its summary says about them.
+
+    Parameters
+    ----------
+    run : Run
+        As it was read from its files.
+
+    Returns
+    -------
+    list of str
+        Problems, one clause each; empty if there is none.
+    """
     frames = run.frames
     vesicles = len(run.scene.vesicles)
     points = run.work.points or run.scene.numerics.points  # records that lack the first have a fixed number

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from importlib.metadata import version
 from typing import Any, NamedTuple, Self
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 from ensemble.config.run_key import DISTRIBUTION, run_key
 from ensemble.timestamp import Timestamp, now
@@ -124,3 +124,20 @@ def rebuild(summary: RunSummary, read: Callable[[str], Array]) -> Run:
             tension=read("tension"),
         ),
     )
+
+
+def first_problem(error: ValidationError) -> str:
+    """Say on one line what is wrong with a record.
+
+    Parameters
+    ----------
+    error : ValidationError
+        What its model found.
+
+    Returns
+    -------
+    str
+        The first field that is wrong, and how.
+    """
+    first = error.errors(include_url=False)[0]
+    return f"{'.'.join(map(str, first['loc']))}: {first['msg']}"

@@ -9,21 +9,30 @@ stores may share a database: the catalog of each is in a schema of its own.
 from __future__ import annotations
 
 import secrets
+import shutil
+import sqlite3
+from collections.abc import Callable
+from contextlib import closing
+from functools import partial
 from pathlib import Path
-from typing import Self
+from tempfile import TemporaryDirectory
+from typing import Literal, Self
+from urllib.parse import quote
 
 from pydantic import BaseModel, ConfigDict
 from pydantic_settings import BaseSettings, SettingsConfigDict
 from sqlalchemy import URL, Engine, create_engine, event, make_url
 from sqlalchemy.engine.interfaces import DBAPIConnection
 from sqlalchemy.exc import ArgumentError, DBAPIError, NoSuchModuleError
-from sqlalchemy.pool import ConnectionPoolEntry
+from sqlalchemy.pool import ConnectionPoolEntry, QueuePool
 
 from ensemble.disk import flush, replacing
 
 CATALOG = "catalog.sqlite"
 PLACE = "catalog.json"
 BUSY_SECONDS = 60
+
+Journal = Literal["wal", "delete"]
 
 # What is raised where a URL is none, its driver is missing, or the database does not answer.
 UNUSABLE = (ArgumentError, NoSuchModuleError, ModuleNotFoundError, DBAPIError)
@@ -86,18 +95,83 @@ def is_file(url: str) -> bool:
     return make_url(url).get_backend_name() == "sqlite"
 
 
-def engine(url: str) -> Engine:
-    """Make what connects to a database; each commit on it outlives a power failure."""
+def engine(url: str, journal: Journal = "wal") -> Engine:
+    """Make what connects to a database; each commit on it outlives a power failure.
+
+    Parameters
+    ----------
+    url : str
+        Of an SQLite file or a server.
+    journal : str
+        How an SQLite file keeps commits whole.  With ``"wal"`` readers wait for no writer, but the file must
+        be used from one machine only, and readers leave files beside it.  With ``"delete"`` neither holds.
+    """
     if not is_file(url):
         return create_engine(url, pool_pre_ping=True)
     made = create_engine(url, connect_args={"timeout": BUSY_SECONDS})
-    event.listen(made, "connect", _durable)
+    event.listen(made, "connect", partial(_durable, journal))
     return made
 
 
-def _durable(connection: DBAPIConnection, _: ConnectionPoolEntry) -> None:
+def reading_engine(url: str) -> Engine:
+    """Make what reads a database and changes nothing: no file appears beside an SQLite file.
+
+    It works where the file, its directory or the whole file system is read-only.
+
+    Parameters
+    ----------
+    url : str
+        Of an SQLite file or a server.
+    """
+    path = make_url(url).database if is_file(url) else None
+    if path is None:
+        return create_engine(url, pool_pre_ping=True)
+    return create_engine("sqlite://", creator=partial(_connect_to_read, Path(path)), poolclass=QueuePool)
+
+
+def _connect_to_read(path: Path) -> sqlite3.Connection:
+    def connect(file: Path, option: str) -> sqlite3.Connection:
+        address = f"file:{quote(str(file))}?{option}"
+        connection = sqlite3.connect(address, uri=True, timeout=BUSY_SECONDS, check_same_thread=False)
+        connection.execute("SELECT count(*) FROM sqlite_master")  # opens the file
+        return connection
+
+    if _in_wal_mode(path):
+        log = path.with_name(path.name + "-wal")
+        if not log.exists() or log.stat().st_size == 0:
+            return connect(path, "immutable=1")
+        return _connect_to_copy(path, connect)
+    try:
+        return connect(path, "mode=ro")
+    except sqlite3.OperationalError:
+        # A commit was cut short, and undoing it needs a file that can be written.
+        if not path.with_name(path.name + "-journal").exists():
+            raise
+        return _connect_to_copy(path, connect)
+
+
+def _connect_to_copy(path: Path, connect: Callable[[Path, str], sqlite3.Connection]) -> sqlite3.Connection:
+    """Open a copy of the file and of what a writer left beside it, and forget the copy at once."""
+    with TemporaryDirectory(prefix="ensemble-catalog-") as directory:
+        for suffix in ("", "-wal", "-journal"):
+            source = path.with_name(path.name + suffix)
+            if source.exists():
+                shutil.copyfile(source, Path(directory, path.name + suffix))
+        with closing(connect(Path(directory, path.name), "mode=rw")) as copy:
+            memory = sqlite3.connect(":memory:", check_same_thread=False)
+            copy.backup(memory)
+    return memory
+
+
+def _in_wal_mode(path: Path) -> bool:
+    """Tell from its header whether readers of an SQLite file need a write-ahead log."""
+    with path.open("rb") as file:
+        return file.read(20)[18:20] == b"\x02\x02"
+
+
+def _durable(journal: Journal, connection: DBAPIConnection, _: ConnectionPoolEntry) -> None:
     cursor = connection.cursor()
-    cursor.execute("PRAGMA journal_mode=WAL")  # readers wait for no writer
+    cursor.execute(f"PRAGMA journal_mode={journal}")
     cursor.execute("PRAGMA synchronous=FULL")  # an acknowledged commit outlives a power failure
     cursor.close()
 

@@ -1,61 +1,166 @@
-"""Where runs are written before they are committed: a directory for each writer, its own while it lives."""
+"""Where finished runs are written before they are committed.
+
+Each process that stages runs has a directory of its own in `staging/`, whose lock it holds while it lives.  A
+run is written as ``NAME.partial`` and renamed once all of it is on disk, so a directory without that suffix
+is a whole run, also after a crash: the next process that opens the store to write commits it.
+"""
 
 from __future__ import annotations
 
 import fcntl
 import os
+import re
 import shutil
 import threading
 from collections.abc import Iterator
+from contextlib import AbstractContextManager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from uuid import uuid4
 
-from ensemble.disk import locked
+from ensemble.disk import flush, flush_tree, locked
+from ensemble.store.run_record import RunSummary
+from solver.analysis.run import Run
 
-LOCK = "writer.lock"
+STAGING = "staging"
+STORE_LOCK = "store.lock"
+WRITER_LOCK = "writer.lock"
+PARTIAL = ".partial"
+
+_NAME = re.compile(r"[0-9a-f]{32}")  # of directories that this module makes
 
 
-class Writer:
-    """A directory in `staging` that holds its lock, and so is not swept, until closed or killed.
+@dataclass(frozen=True)
+class Staged:
+    """A run that is written but not committed.  It may be sent to the process that commits it."""
 
-    The directory is made by the first call of `place`, so readers leave no trace.
+    directory: Path
+    summary: RunSummary
+
+    @property
+    def key(self) -> str:
+        """Key of the run."""
+        return self.summary.key
+
+
+class RunStaging(AbstractContextManager["RunStaging"]):
+    """Writes runs for a store without opening its catalog, from any number of threads.
+
+    Ranks other than the first have this instead of a store: they need no database connection.
+
+    Parameters
+    ----------
+    store : Path
+        Directory of the store.
     """
 
-    def __init__(self, staging: Path, store_lock: Path) -> None:
-        self._directory = staging / uuid4().hex
-        self._store_lock = store_lock
+    def __init__(self, store: Path) -> None:
+        # Resolved, so that a staged run means the same to a process in another working directory.
+        self.path = store.resolve()
+        self._directory = self.path / STAGING / uuid4().hex
         self._descriptor: int | None = None
         self._guard = threading.Lock()
 
-    def place(self) -> Path:
-        """Name a new directory to write a run to."""
+    def stage(self, run: Run, summary: RunSummary | None = None) -> Staged:
+        """Write a run to disk without committing it.
+
+        Parameters
+        ----------
+        run : Run
+            A finished run.
+        summary : RunSummary, optional
+            Of a run that another store has; left out, that of a run which this process has made.
+
+        Returns
+        -------
+        Staged
+            What `Store.commit` takes, in this process or another one.
+        """
+        from ensemble.store.archive import write_run
+
+        summary = RunSummary.of(run) if summary is None else summary
         with self._guard:
             if self._descriptor is None:
                 self._descriptor = self._register()
-        return self._directory / uuid4().hex
+        whole = self._directory / uuid4().hex
+        partial = whole.with_suffix(PARTIAL)
+        write_run(partial, summary, run)
+        flush_tree(partial)
+        partial.rename(whole)
+        flush(self._directory)
+        return Staged(whole, summary)
+
+    def close(self) -> None:
+        """Remove this process's directory, unless a whole run in it waits to be committed."""
+        with self._guard:
+            if self._descriptor is None:
+                return
+            if not any(whole_runs(self._directory)):
+                shutil.rmtree(self._directory, ignore_errors=True)
+            os.close(self._descriptor)
+            self._descriptor = None
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
     def _register(self) -> int:
-        # Under the store's lock no sweeper meets the directory before its lock is taken.
-        with locked(self._store_lock):
-            self._directory.mkdir()
-            descriptor = os.open(self._directory / LOCK, os.O_RDWR | os.O_CREAT, 0o644)
+        # Under the store's lock no recovery meets the directory before its own lock is taken.
+        with locked(self.path / STORE_LOCK):
+            self._directory.mkdir(parents=True)
+            descriptor = os.open(self._directory / WRITER_LOCK, os.O_RDWR | os.O_CREAT, 0o666)
             fcntl.flock(descriptor, fcntl.LOCK_EX)
         return descriptor
 
-    def close(self) -> None:
-        """Remove the directory with whatever was not committed."""
-        with self._guard:
-            if self._descriptor is not None:
-                shutil.rmtree(self._directory, ignore_errors=True)
-                os.close(self._descriptor)
-                self._descriptor = None
+
+def whole_runs(directory: Path) -> Iterator[Path]:
+    """Find the whole runs in the directory of one writer.
+
+    Parameters
+    ----------
+    directory : Path
+        A directory in `staging/`.
+
+    Yields
+    ------
+    Path
+        The directory of a run.
+    """
+    with suppress(FileNotFoundError):
+        yield from (entry for entry in directory.iterdir() if is_own_directory(entry))
 
 
-def _abandoned(directory: Path) -> bool:
+def is_own_directory(path: Path) -> bool:
+    """Tell whether a path is a directory with a name as the store gives it: 32 hexadecimal digits.
+
+    Parameters
+    ----------
+    path : Path
+        An entry of `runs/`, of `staging/` or of a writer's directory.  Links do not count.
+    """
+    return bool(_NAME.fullmatch(path.name)) and path.is_dir() and not path.is_symlink()
+
+
+def abandoned(staging: Path) -> Iterator[Path]:
+    """Find the directories of writers that no longer live.
+
+    Parameters
+    ----------
+    staging : Path
+        The directory `staging/` of a store, whose lock the caller holds.
+
+    Yields
+    ------
+    Path
+        A directory that a writer made.  Everything else in `staging/` is left alone.
+    """
+    return (entry for entry in staging.iterdir() if is_own_directory(entry) and _has_no_writer(entry))
+
+
+def _has_no_writer(directory: Path) -> bool:
     try:
-        descriptor = os.open(directory / LOCK, os.O_RDWR)
-    except (FileNotFoundError, NotADirectoryError):
-        return True
+        descriptor = os.open(directory / WRITER_LOCK, os.O_RDWR)
+    except OSError:  # no lock file: not a writer's; or it belongs to somebody else
+        return False
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -63,8 +168,3 @@ def _abandoned(directory: Path) -> bool:
     finally:
         os.close(descriptor)
     return True
-
-
-def abandoned(staging: Path) -> Iterator[Path]:
-    """Directories whose writer no longer lives.  The caller holds the store's lock."""
-    return (entry for entry in staging.iterdir() if _abandoned(entry))

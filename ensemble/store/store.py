@@ -6,88 +6,93 @@ want its catalog.
 
 from __future__ import annotations
 
+import errno
 import json
+import logging
 import os
 import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, closing, contextmanager
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
+from typing import Self, TypeVar
 
 from pydantic import ValidationError
 from sqlalchemy.exc import DatabaseError
+from tenacity import Retrying, retry_if_exception_type, stop_after_delay, wait_exponential_jitter
 
-from ensemble.disk import flush, flush_tree, locked
-from ensemble.errors import NotStored, StoreInputError
+from ensemble.disk import flush, locked
+from ensemble.errors import NotStored, OtherVersionError, StoreError, StoreInputError
 from ensemble.search.boundary import Boundary
 from ensemble.store.catalog import Catalog, Record
-from ensemble.store.run_record import RunSummary
-from ensemble.store.sql_database import CATALOG, PLACE, UNUSABLE, Place, reason
-from ensemble.store.staging import Writer, abandoned
+from ensemble.store.recovery import RUNS, Recovery
+from ensemble.store.run_record import RunSummary, first_problem
+from ensemble.store.sql_database import CATALOG, PLACE, UNUSABLE, Place, is_file, reason
+from ensemble.store.staging import STAGING, STORE_LOCK, RunStaging, Staged
 from solver.analysis.run import Outcome, Run
 
-LOCK = "store.lock"
-RUNS = "runs"
-STAGING = "staging"
+COMMIT_SECONDS = 60  # for which a commit is tried again while the database or the disk does not answer
 
-
-@dataclass(frozen=True)
-class Staged:
-    """A run that is written but not committed.  It may be sent to the process that commits it."""
-
-    directory: Path
-    summary: RunSummary
-
-    @property
-    def key(self) -> str:
-        """Key of the run."""
-        return self.summary.key
+_log = logging.getLogger(__name__)
 
 
 class Store(AbstractContextManager["Store"]):
     """Runs and boundaries in a directory, for any number of processes and threads at once.
 
     Get one from `Store.open` or `Store.existing` and use it as a context manager.  A process that stages runs
-    for another one to commit keeps its store open until they are committed: closing removes them.
+    for another one to commit keeps its store open until they are committed.
 
     Parameters
     ----------
     path : Path
         The directory.
+    read_only : bool
+        Whether this process only reads: then it leaves no trace.
     """
 
-    def __init__(self, path: Path) -> None:
-        # Resolved, so that a staged run means the same to a process in another working directory.
+    def __init__(self, path: Path, read_only: bool = False) -> None:
         self.path = path.resolve()
         self._runs = self.path / RUNS
-        self._staging = self.path / STAGING
-        self._lock = self.path / LOCK
-        self._catalog = Catalog(Place.of(self.path))
-        self._writer = Writer(self._staging, self._lock)
+        self._lock = self.path / STORE_LOCK
+        self._catalog = Catalog(Place.of(self.path), read_only)
+        self._staging = RunStaging(self.path)
+        self._recovery = Recovery(self.path, self._catalog)
 
     @classmethod
     def open(cls, path: Path) -> Self:
-        """Open a store to write to: create it if there is none, and sweep it.
+        """Open a store to write to: create it if there is none, and adopt what processes left in it.
 
         A new one has its catalog in a file, or on the server that `ensemble.store.sql_database` tells of.
+
+        Parameters
+        ----------
+        path : Path
+            The directory.
 
         Raises
         ------
         StoreInputError
-            If the path is a file, a directory with other contents, or cannot be created, or if the database
-            cannot be used.
+            If the path is a file, a directory with other contents, or cannot be created or written to, or if
+            the database cannot be used.
         """
         if not _exists(path):
             _create(path)
         with _refused(path):
+            _require_writable(path)
+            _require_catalog(path)
             store = cls(path)
-            store.sweep()
+            store._catalog.require_writable()
+            for line in store.recover():
+                _log.warning("store: %s", line)
         return store
 
     @classmethod
     def existing(cls, path: Path) -> Self:
-        """Open a store that must be there; nothing is created and nothing swept.
+        """Open a store that must be there, to read it; nothing is created and nothing changes.
+
+        Parameters
+        ----------
+        path : Path
+            The directory.
 
         Raises
         ------
@@ -97,59 +102,194 @@ class Store(AbstractContextManager["Store"]):
         if not _exists(path):
             raise StoreInputError(f"store: there is no store at {path}")
         with _refused(path):
-            store = cls(path)
+            _require_catalog(path)
+            store = cls(path, read_only=True)
             store._catalog.keys()
         return store
 
     def close(self) -> None:
-        """Drop what this process staged and did not commit, and close the catalog."""
-        self._writer.close()
+        """Close the catalog.  Whole runs that this process staged stay for the next one to adopt."""
+        self._staging.close()
         self._catalog.close()
 
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def stage(self, run: Run) -> Staged:
-        """Write a run to disk without committing it; any process may."""
-        from ensemble.store.archive import write_run
+    def stage(self, run: Run, summary: RunSummary | None = None) -> Staged:
+        """Write a run to disk without committing it; see `RunStaging.stage`.
 
-        staged = Staged(self._writer.place(), RunSummary.of(run))
-        write_run(staged.directory, staged.summary, run)
-        flush_tree(staged.directory)
-        return staged
+        Parameters
+        ----------
+        run : Run
+            A finished run.
+        summary : RunSummary, optional
+            Of a run that another store has.
+        """
+        return self._staging.stage(run, summary)
 
     def commit(self, staged: Staged) -> str:
         """Make a staged run exist, and return its key.
 
-        If the key exists already, that run stays and the staged copy is removed.
+        If the key exists already, that run stays and the staged copy is removed.  While the database or the
+        disk does not answer the commit is tried again for `COMMIT_SECONDS`.
+
+        Parameters
+        ----------
+        staged : Staged
+            From `stage`, of this process or another one.
+
+        Raises
+        ------
+        StoreError
+            If the run could not be committed.  It stays where it is and the next process that opens the store
+            to write adopts it.
         """
+        trouble = (OSError, *UNUSABLE)
+        attempts = Retrying(
+            retry=retry_if_exception_type(trouble),
+            stop=stop_after_delay(COMMIT_SECONDS),
+            wait=wait_exponential_jitter(0.1, 5.0),
+            reraise=True,
+        )
+        try:
+            return attempts(self._commit_once, staged)
+        except trouble as error:
+            raise StoreError(
+                f"run {staged.key}: it could not be committed ({reason(error)}); it is kept in {self.path} "
+                "and the next command that writes there adopts it"
+            ) from error
+
+    def _commit_once(self, staged: Staged) -> str:
         destination = self._runs / staged.key
         with locked(self._lock):
             if self.contains(staged.key):
                 shutil.rmtree(staged.directory, ignore_errors=True)
                 return staged.key
-            if destination.exists():
-                # Of a process that died between the rename and the catalog.
-                shutil.rmtree(destination)
-            os.rename(staged.directory, destination)
-            flush(self._runs)
+            if staged.directory.exists():  # else an earlier attempt has moved it
+                if destination.exists():
+                    # Of a process that died between the rename and the catalog; damaged perhaps.
+                    self._recovery.set_aside(destination)
+                os.rename(staged.directory, destination)
+                flush(self._runs)
             self._catalog.insert(staged.summary)
         return staged.key
 
-    def save(self, run: Run) -> str:
-        """Stage and commit a run, and return its key."""
-        return self.commit(self.stage(run))
+    def save(self, run: Run, summary: RunSummary | None = None) -> str:
+        """Stage and commit a run, and return its key.
 
-    def sweep(self) -> None:
-        """Remove what dead processes left behind."""
+        Parameters
+        ----------
+        run : Run
+            A finished run.
+        summary : RunSummary, optional
+            Of a run that another store has.
+        """
+        return self.commit(self.stage(run, summary))
+
+    def recover(self) -> list[str]:
+        """Bring directory and catalog together; see `ensemble.store.recovery`.
+
+        Returns
+        -------
+        list of str
+            What was done, one clause each; empty if there was nothing to do.
+        """
         with locked(self._lock):
-            for leftover in self._leftovers():
-                shutil.rmtree(leftover)
+            return self._recovery.recover()
 
-    def _leftovers(self) -> Iterator[Path]:
-        committed = self._catalog.keys()
-        yield from (entry for entry in self._runs.iterdir() if entry.name not in committed)
-        yield from abandoned(self._staging)
+    @classmethod
+    def repair(cls, path: Path) -> list[str]:
+        """Rebuild a lost or damaged catalog from the runs, adopt whole runs and set damaged ones aside.
+
+        Nothing is deleted: what cannot be used is moved to `lost+found/`.  Boundaries are only in the
+        catalog; the studies that traced them trace them again without a simulation.
+
+        Parameters
+        ----------
+        path : Path
+            The directory.
+
+        Returns
+        -------
+        list of str
+            What was done, one clause each.
+
+        Raises
+        ------
+        StoreInputError
+            If there is no store at the path, or it cannot be written to.
+        """
+        from ensemble.store.check import check_run
+
+        if not (path / RUNS).is_dir():
+            raise StoreInputError(f"store: there is no store at {path}")
+        done = []
+        with _refused(path):
+            _require_writable(path)
+            (path / STAGING).mkdir(exist_ok=True)
+            if is_file(Place.of(path).url) and not _is_usable(path):
+                done += cls._new_catalog(path)
+            store = cls(path)
+        with store, _refused(path):
+            done += store.recover()
+            for record in store._catalog.runs(()):
+                try:
+                    summary = _validated(RunSummary, "run", record)
+                except OtherVersionError as error:
+                    done.append(f"{error}; left as it is")
+                    continue
+                problems = check_run(store._runs / summary.key, summary)
+                if problems:
+                    with locked(store._lock):
+                        store._set_aside(summary.key)
+                    done.append(f"{problems[0]}; set aside, so that it can be made again")
+        return done
+
+    @staticmethod
+    def _new_catalog(path: Path) -> list[str]:
+        """Put an empty catalog in the place of one that is lost or damaged, which is kept."""
+        done = []
+        with locked(path / STORE_LOCK):
+            catalog = Catalog(Place.of(path))
+            recovery = Recovery(path, catalog)
+            for suffix in ("", "-wal", "-shm", "-journal"):
+                file = path / f"{CATALOG}{suffix}"
+                if file.exists():
+                    done.append(f"{file.name} is damaged; moved to {recovery.set_aside(file)}")
+            (path / CATALOG).touch()
+            with closing(catalog):
+                catalog.create()
+        return [*done, f"{CATALOG} is made anew"]
+
+    def set_aside(self, key: str) -> Path:
+        """Take a run out of the store, so that it can be made again, and keep its files.
+
+        Parameters
+        ----------
+        key : str
+            Of a committed run.
+
+        Returns
+        -------
+        Path
+            Where its files are now.
+
+        Raises
+        ------
+        NotStored
+            If there is no such run.
+        """
+        self.run_record(key)
+        with locked(self._lock):
+            return self._set_aside(key)
+
+    def _set_aside(self, key: str) -> Path:
+        # The row goes last: a process that dies in between leaves a row without files, which `check` names.
+        place = (
+            self._recovery.set_aside(self._runs / key) if (self._runs / key).exists() else self._runs / key
+        )
+        self._catalog.remove(key)
+        return place
 
     def contains(self, key: str) -> bool:
         """Tell whether a run is committed."""
@@ -168,7 +308,7 @@ class Store(AbstractContextManager["Store"]):
         NotStored
             If there is no such run.
         """
-        return RunSummary.model_validate_json(self.run_record(key).json)
+        return _validated(RunSummary, "run", self.run_record(key))
 
     def run_record(self, key: str) -> Record:
         """What `summary` reads, as it was recorded.
@@ -202,6 +342,8 @@ class Store(AbstractContextManager["Store"]):
     def summaries(self, where: Sequence[str] = ()) -> list[RunSummary]:
         """Summaries of the runs that meet all filters, oldest first.
 
+        A record that this version cannot read is left out, with a warning that names it.
+
         Parameters
         ----------
         where : sequence of str
@@ -213,7 +355,7 @@ class Store(AbstractContextManager["Store"]):
         StoreInputError
             If a filter is malformed, or its field or value is none.
         """
-        return [RunSummary.model_validate_json(record.json) for record in self._catalog.runs(where)]
+        return _readable(RunSummary, "run", self._catalog.runs(where))
 
     def runs_page(
         self, where: Sequence[str] = (), after: str | None = None, limit: int = 100
@@ -251,7 +393,7 @@ class Store(AbstractContextManager["Store"]):
         StoreInputError
             If a filter is malformed, or its field or value is none.
         """
-        return [Boundary.model_validate_json(record.json) for record in self._catalog.boundaries(where)]
+        return _readable(Boundary, "boundary", self._catalog.boundaries(where))
 
     def boundary(self, study_key: str) -> Boundary:
         """Boundary of one study.
@@ -261,7 +403,7 @@ class Store(AbstractContextManager["Store"]):
         NotStored
             If there is none.
         """
-        return Boundary.model_validate_json(self.boundary_record(study_key).json)
+        return _validated(Boundary, "boundary", self.boundary_record(study_key))
 
     def boundary_record(self, study_key: str) -> Record:
         """What `boundary` reads, as it was recorded.
@@ -298,10 +440,7 @@ class Store(AbstractContextManager["Store"]):
         return self._catalog.boundaries_page(where, after, limit)
 
     def check(self) -> list[str]:
-        """Verify every run and boundary.
-
-        What a dead process left behind without committing it was never part of the store, so it is no
-        problem; the next `open` sweeps it.
+        """Verify every run and boundary, and that directory and catalog name the same runs.
 
         Returns
         -------
@@ -310,17 +449,26 @@ class Store(AbstractContextManager["Store"]):
         """
         from ensemble.store.check import check_run
 
+        problems = []
         try:
-            summaries = self.summaries()
-            self.boundaries()
-        except (DatabaseError, ValidationError) as error:
-            return [f"the catalog cannot be read ({error})"]
-        return [problem for summary in summaries for problem in check_run(self._runs / summary.key, summary)]
+            different = self._recovery.differences()
+            runs, boundaries = self._catalog.runs(()), self._catalog.boundaries(())
+        except DatabaseError as error:
+            return [f"the catalog cannot be read ({reason(error)})"]
+        for record in boundaries:
+            problems += _unreadable(Boundary, "boundary", record)
+        for record in runs:
+            directory = self._runs / record.key
+            unreadable = _unreadable(RunSummary, "run", record)
+            problems += unreadable
+            if directory.is_dir() and not unreadable:
+                problems += check_run(directory, _validated(RunSummary, "run", record))
+        return [*different, *problems]
 
 
 def _exists(path: Path) -> bool:
-    # Made last, so where it is the store is whole.
-    return (path / STAGING).is_dir()
+    # An empty `staging` may be missing from a copy.
+    return (path / RUNS).is_dir() and any((path / name).exists() for name in (STAGING, CATALOG, PLACE))
 
 
 def _create(path: Path) -> None:
@@ -328,14 +476,16 @@ def _create(path: Path) -> None:
         raise StoreInputError(f"store: {path} is a file; give a directory")
     with _refused(path):
         path.mkdir(parents=True, exist_ok=True)
-        # Sweeping removes what it does not know: a directory of anything else must never become a store.
-        foreign = {entry.name for entry in path.iterdir()} - {LOCK}
+        # Hidden files (of a desktop, say) do no harm.
+        foreign = {entry.name for entry in path.iterdir() if not entry.name.startswith(".")} - {STORE_LOCK}
         if foreign and not foreign & {CATALOG, PLACE}:
             raise StoreInputError(
-                f"store: {path} is no store and already holds {min(foreign)}; give a new directory"
+                f"store: {path} is not a store and already holds {min(foreign)}; give a new directory"
             )
-        with locked(path / LOCK):
+        with locked(path / STORE_LOCK):
             place = Place.choose(path)
+            if is_file(place.url):
+                (path / CATALOG).touch()  # SQLite itself would not honor the umask
             with closing(Catalog(place)) as catalog:
                 catalog.create()
             place.keep(path)
@@ -344,10 +494,78 @@ def _create(path: Path) -> None:
             flush(path)
 
 
+def _require_writable(path: Path) -> None:
+    """Raise an error unless runs could be written, before any is computed."""
+    for directory in (path, path / RUNS, path / STAGING):
+        if directory.exists() and not os.access(directory, os.W_OK | os.X_OK):
+            raise PermissionError(errno.EACCES, f"no permission to write to {directory}")
+
+
+def _require_catalog(path: Path) -> None:
+    """Raise an error where the file of the catalog is missing, before a new one is made in its place."""
+    if is_file(Place.of(path).url) and not (path / CATALOG).exists():
+        raise FileNotFoundError(errno.ENOENT, f"{CATALOG} is missing")
+
+
+def _is_usable(path: Path) -> bool:
+    """Tell whether the catalog in a file is there and whole."""
+    try:
+        _require_catalog(path)
+        with closing(Catalog(Place.of(path))) as catalog:
+            catalog.require_whole()
+    except (OSError, DatabaseError):
+        return False
+    return True
+
+
 @contextmanager
 def _refused(path: Path) -> Iterator[None]:
-    """Say of a store that cannot be opened that it cannot."""
+    """Say why a store cannot be opened."""
     try:
         yield
     except (OSError, *UNUSABLE) as error:
-        raise StoreInputError(f"store: {path} cannot be opened ({reason(error)})") from error
+        text = getattr(error, "strerror", None) or reason(error)
+        lost = isinstance(error, FileNotFoundError | DatabaseError) and _exists(path)
+        hint = (
+            f"; `ensemble check --repair --store {path}` rebuilds a lost or damaged catalog" if lost else ""
+        )
+        raise StoreInputError(f"store: {path} cannot be opened ({text}){hint}") from error
+
+
+AnyDocument = TypeVar("AnyDocument", RunSummary, Boundary)
+
+
+def _validated(model: type[AnyDocument], kind: str, record: Record) -> AnyDocument:
+    """Read a record of the catalog.
+
+    Raises
+    ------
+    OtherVersionError
+        If this version cannot.
+    """
+    try:
+        return model.model_validate_json(record.json)
+    except ValidationError as error:
+        raise OtherVersionError(
+            f"{kind} {record.key}: this version cannot read its record ({first_problem(error)})"
+        ) from error
+
+
+def _unreadable(model: type[AnyDocument], kind: str, record: Record) -> list[str]:
+    """Say what keeps this version from reading a record; empty if nothing does."""
+    try:
+        _validated(model, kind, record)
+    except OtherVersionError as error:
+        return [str(error)]
+    return []
+
+
+def _readable(model: type[AnyDocument], kind: str, records: Sequence[Record]) -> list[AnyDocument]:
+    """Read records, leaving out those that this version cannot read, with a warning that names each."""
+    documents = []
+    for record in records:
+        try:
+            documents.append(_validated(model, kind, record))
+        except OtherVersionError as error:
+            _log.warning("store: %s; left out", error)
+    return documents

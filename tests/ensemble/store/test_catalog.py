@@ -53,7 +53,7 @@ class TestPostgreSQL(CatalogConformance):
             key = other.save(shear_run())
             assert not store.contains(key)
             store.save(shear_run())
-            store.sweep()
+            store.recover()
             assert other.check() == []
 
     def test_a_store_whose_database_is_lost_is_refused_and_left_alone(self, store: Store) -> None:

@@ -1,0 +1,54 @@
+"""One store on all ranks: the first rank opens it, the others only write runs for it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ensemble.errors import refusing
+from ensemble.mpi.world import on_root
+
+if TYPE_CHECKING:
+    from mpi4py.MPI import Intracomm
+
+    from ensemble.store import RunStaging, Store
+
+
+@contextmanager
+def store_on_ranks(communicator: Intracomm, path: Path) -> Iterator[Store | RunStaging]:
+    """Open a store to write to, on all ranks of a communicator.
+
+    Only the first rank has a connection to the catalog: SQLite files on a network file system must be used
+    from one node, and servers limit their connections.  Collective.
+
+    Parameters
+    ----------
+    communicator : Intracomm
+    path : Path
+        As the first rank understands it.
+
+    Yields
+    ------
+    Store or RunStaging
+        The store on the first rank, and where runs are staged for it on the others.
+
+    Raises
+    ------
+    BadInput
+        On every rank, if the first one cannot open the store to write.
+    """
+    from ensemble.store import RunStaging, Store
+
+    with ExitStack() as stack:
+        store: Store | None = None
+
+        def open_store() -> Path:
+            nonlocal store
+            with refusing():
+                store = stack.enter_context(Store.open(path))
+            return store.path
+
+        resolved = on_root(communicator, open_store)
+        yield store if store is not None else stack.enter_context(RunStaging(resolved))

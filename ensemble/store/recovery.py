@@ -1,0 +1,153 @@
+"""What becomes of runs that are in the directory of a store but not in its catalog, and the other way round.
+
+Nothing that holds data is deleted.  A whole run without a row is adopted: its row is written.  What is no
+whole run is moved to `lost+found/`.  Only the unfinished staging of a dead process is removed.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from uuid import uuid4
+
+from ensemble.disk import flush
+from ensemble.errors import OtherVersionError, StoreError
+from ensemble.store.catalog import Catalog
+from ensemble.store.run_record import RunSummary
+from ensemble.store.staging import STAGING, abandoned, is_own_directory, whole_runs
+
+RUNS = "runs"
+LOST_AND_FOUND = "lost+found"
+
+
+class Recovery:
+    """Brings the directory and the catalog of a store together.  The caller holds the store's lock.
+
+    Parameters
+    ----------
+    path : Path
+        Directory of the store.
+    catalog : Catalog
+        Its catalog.
+    """
+
+    def __init__(self, path: Path, catalog: Catalog) -> None:
+        self._path = path
+        self._runs = path / RUNS
+        self._catalog = catalog
+
+    def recover(self) -> list[str]:
+        """Adopt whole runs, set aside what is not one, and remove the unfinished staging of dead processes.
+
+        Returns
+        -------
+        list of str
+            What was done, one clause each.
+        """
+        done: list[str] = []
+        committed = self._catalog.keys()
+        adopted = [self._adopt(directory, done) for directory in self._uncataloged(committed)]
+        committed = self._catalog.keys()
+        for writer in abandoned(self._path / STAGING):
+            adopted += [self._adopt_staged(directory, committed) for directory in whole_runs(writer)]
+            shutil.rmtree(writer)
+        if sum(adopted):
+            done.append(f"adopted {sum(adopted)} runs that were not in the catalog of {self._path}")
+        return done
+
+    def set_aside(self, directory: Path) -> Path:
+        """Move a run, or what looks like one, to `lost+found/`.
+
+        Parameters
+        ----------
+        directory : Path
+            An entry of the store.
+
+        Returns
+        -------
+        Path
+            Where it is now.
+        """
+        shelf = self._path / LOST_AND_FOUND
+        shelf.mkdir(exist_ok=True)
+        place = shelf / directory.name
+        while place.exists():
+            place = shelf / f"{directory.name}-{uuid4().hex[:8]}"
+        os.rename(directory, place)
+        flush(shelf)
+        flush(directory.parent)
+        return place
+
+    def differences(self) -> list[str]:
+        """Name what is in the directory and not in the catalog, and the other way round.
+
+        Returns
+        -------
+        list of str
+            One sentence each.
+        """
+        committed = self._catalog.keys()
+        return [
+            *(
+                f"run {directory.name}: it is in {RUNS}/ and not in the catalog"
+                for directory in self._uncataloged(committed)
+            ),
+            *(
+                f"run {key}: it is in the catalog and not in {RUNS}/"
+                for key in sorted(committed)
+                if not (self._runs / key).is_dir()
+            ),
+        ]
+
+    def _uncataloged(self, committed: set[str]) -> Iterator[Path]:
+        entries = sorted(entry for entry in self._runs.iterdir() if entry.name not in committed)
+        return filter(is_own_directory, entries)
+
+    def _adopt(self, directory: Path, done: list[str]) -> bool:
+        """Enter a run of `runs/` into the catalog if it is whole, else move it away and say so."""
+        try:
+            summary = _whole_run(directory)
+            if summary.key != directory.name:
+                raise StoreError(f"run {directory.name}: it is run {summary.key}")
+        except OtherVersionError as error:
+            done.append(f"{error}; left where it is")
+            return False
+        except StoreError as error:
+            done.append(f"{error}; moved to {self.set_aside(directory)}")
+            return False
+        self._catalog.insert(summary)
+        return True
+
+    def _adopt_staged(self, directory: Path, committed: set[str]) -> bool:
+        """Commit a run that a process staged before it died; a torn one is left to be removed."""
+        try:
+            summary = _whole_run(directory)
+        except StoreError:
+            return False
+        if summary.key in committed:
+            return False
+        os.rename(directory, self._runs / summary.key)
+        flush(self._runs)
+        self._catalog.insert(summary)
+        committed.add(summary.key)
+        return True
+
+
+def _whole_run(directory: Path) -> RunSummary:
+    """Return the summary that a run's own files hold.
+
+    Raises
+    ------
+    StoreError
+        If they are not those of a whole run.
+    """
+    from ensemble.store.archive import read_run, read_summary
+    from ensemble.store.check import array_problems
+
+    summary = read_summary(directory)
+    problems = array_problems(read_run(directory))
+    if problems:
+        raise StoreError(f"run {directory.name}: {problems[0]}")
+    return summary
