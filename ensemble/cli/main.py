@@ -126,7 +126,7 @@ def bisect(
     with abort_guard(communicator):
         size = communicator.Get_size()
         prepared, ranks = on_root(
-            communicator, lambda: _prepare(study, changes, tolerance, certify, store, ranks_per_run, size)
+            communicator, lambda: _prepare(study, changes, tolerance, certify, ranks_per_run, size)
         )
         traced = _trace(communicator, prepared, store, progress, ranks)
     if as_json:
@@ -143,21 +143,18 @@ def _prepare(
     changes: list[str],
     tolerance: float | None,
     certify: bool,
-    store: Path,
     ranks_per_run: str | None,
     size: int,
 ) -> tuple[Study, int]:
     """Load the study, then create or sweep the store: a study that is refused leaves no trace."""
     from ensemble.config.documents import load_study
     from ensemble.mpi.groups import chosen_ranks
-    from ensemble.store import Store
 
     with refusing():
         more = [] if tolerance is None else [f"search.tolerance={tolerance!r}"]
         more += ["search.certify=true"] if certify else []
         loaded = load_study(study, [*changes, *more])
         ranks = chosen_ranks(ranks_per_run or "1", loaded.scene, size)
-        Store.open(store).close()
     return loaded, ranks
 
 
@@ -168,10 +165,10 @@ def _trace(
 
     from ensemble.cli.progress import study_lines, study_progress
     from ensemble.mpi.run_study import run_study
-    from ensemble.store import Store
+    from ensemble.mpi.store_on_ranks import store_on_ranks
 
     shown = study_lines if progress is ProgressFormat.JSON else study_progress
-    with Store.existing(path) as store, shown(Console(stderr=True)) as show:
+    with store_on_ranks(communicator, path) as store, shown(Console(stderr=True)) as show:
         return run_study(communicator, study, store, show, ranks_per_run)
 
 
@@ -340,11 +337,11 @@ def _paper(only: list[str], quick: bool, store: Path, ranks_per_run: str | None)
 
     from ensemble.config.documents import load_scene
     from ensemble.mpi.groups import chosen_ranks
-    from ensemble.mpi.world import abort_guard, on_root, world
+    from ensemble.mpi.store_on_ranks import store_on_ranks
+    from ensemble.mpi.world import abort_guard, world
     from ensemble.report.paper.make_paper import make_paper
     from ensemble.report.paper.sections import sections_named
     from ensemble.report.report_progress import report_progress
-    from ensemble.store import Store
 
     with refusing():
         sections = sections_named(only)
@@ -352,8 +349,7 @@ def _paper(only: list[str], quick: bool, store: Path, ranks_per_run: str | None)
     with abort_guard(communicator):
         # Its scenes have one vesicle or two.
         ranks = chosen_ranks(ranks_per_run or "1", load_scene("doublet-shear"), communicator.Get_size())
-        on_root(communicator, lambda: _create(store))
-        with Store.existing(store) as opened, report_progress(Console(stderr=True)) as tell:
+        with store_on_ranks(communicator, store) as opened, report_progress(Console(stderr=True)) as tell:
             return make_paper(communicator, opened, sections, quick, tell, ranks)
 
 
@@ -361,21 +357,15 @@ def _scaling(quick: bool, store: Path) -> FinishedReport | None:
     """Make the report on scaling on all ranks; None on all but the first."""
     from rich.console import Console
 
-    from ensemble.mpi.world import abort_guard, on_root, world
+    from ensemble.mpi.store_on_ranks import store_on_ranks
+    from ensemble.mpi.world import abort_guard, world
     from ensemble.report.report_progress import report_progress
     from ensemble.report.scaling.make_scaling import make_scaling
-    from ensemble.store import Store
 
     communicator = world()
     with abort_guard(communicator):
-        on_root(communicator, lambda: _create(store))
-        with Store.existing(store) as opened, report_progress(Console(stderr=True)) as tell:
+        with store_on_ranks(communicator, store) as opened, report_progress(Console(stderr=True)) as tell:
             return make_scaling(communicator, opened, quick, tell)
-
-
-def _create(store: Path) -> None:
-    with refusing():
-        _opened(store).close()
 
 
 def _measurements(name: ReportName, quick: bool, store: Path) -> FinishedReport | None:

@@ -24,6 +24,7 @@ from ensemble.search.task_queue import SomeTask, Task, TaskQueue
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
 
+    from ensemble.mpi.store_on_ranks import StoreOnRank
     from ensemble.store import Staged, Store
     from solver.analysis.run import Outcome
 
@@ -81,7 +82,7 @@ class JobProgress(Generic[SomeTask]):
     seconds_left: float | None  # estimate, None before the first run is finished
 
 
-def work(groups: Groups, store: Store) -> None:
+def work(groups: Groups, store: StoreOnRank) -> None:
     """Simulate what the dispatcher orders until it says stop; all ranks do."""
     with abort_guard(groups.everyone):
         if groups.leaders is None:
@@ -90,7 +91,7 @@ def work(groups: Groups, store: Store) -> None:
             _lead(groups, groups.leaders, store)
 
 
-def _lead(groups: Groups, leaders: Intracomm, store: Store) -> None:
+def _lead(groups: Groups, leaders: Intracomm, store: StoreOnRank) -> None:
     _send(leaders, Ready(), 0, _REPORTS)
     while True:
         order = _wait(leaders)
@@ -118,7 +119,7 @@ def _wait(communicator: Intracomm) -> Order:
     return cast(Order, received[0])
 
 
-def _simulate(groups: Groups, leaders: Intracomm, store: Store, task: Task) -> Report:
+def _simulate(groups: Groups, leaders: Intracomm, store: StoreOnRank, task: Task) -> Report:
     # A study whose answers are all in the store never needs the compiled kernels.
     from solver.simulation.simulate import Cancelled, simulate
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, TypeVar, cast
 
 from ensemble.mpi.dispatcher import Dispatcher, JobProgress, work
 from ensemble.mpi.groups import Groups
+from ensemble.mpi.store_on_ranks import whole_store
 from ensemble.mpi.usage import RunUsage, Usage
 from ensemble.mpi.world import abort_guard
 from ensemble.search.batch import Batch
@@ -21,8 +22,8 @@ if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
 
     from ensemble.config.study import Study
+    from ensemble.mpi.store_on_ranks import StoreOnRank
     from ensemble.search.boundary import Boundary
-    from ensemble.store import Store
     from solver.scene import Scene
 
 Result = TypeVar("Result")
@@ -47,7 +48,7 @@ class StudyResult:
 def run_study(
     communicator: Intracomm,
     study: Study,
-    store: Store,
+    store: StoreOnRank,
     on_change: Callable[[Snapshot], None],
     ranks_per_run: int = 1,
 ) -> StudyResult:
@@ -74,11 +75,12 @@ def run_study(
     """
 
     def begin() -> StudyPlanner:
-        return StudyPlanner(study, store.outcome, (summary.scene for summary in store.summaries()))
+        kept = whole_store(store)
+        return StudyPlanner(study, kept.outcome, (summary.scene for summary in kept.summaries()))
 
     def publish(planner: StudyPlanner, progress: JobProgress[SearchRun]) -> None:
         boundary = planner.boundary()
-        store.save_boundary(boundary)
+        whole_store(store).save_boundary(boundary)
         on_change(Snapshot(boundary, progress))
 
     boundary, cost = carry_out(communicator, ranks_per_run, store, begin, publish, StudyPlanner.boundary)
@@ -88,7 +90,7 @@ def run_study(
 def run_batch(
     communicator: Intracomm,
     scenes: Iterable[Scene],
-    store: Store,
+    store: StoreOnRank,
     on_change: Callable[[JobProgress[Task]], None],
     ranks_per_run: int = 1,
 ) -> RunUsage:
@@ -105,7 +107,7 @@ def run_batch(
         communicator,
         ranks_per_run,
         store,
-        begin=lambda: Batch(scenes, store.outcome),
+        begin=lambda: Batch(scenes, whole_store(store).outcome),
         publish=lambda batch, progress: on_change(progress),
         conclude=lambda batch: None,
     )
@@ -118,7 +120,7 @@ SomeTaskQueue = TypeVar("SomeTaskQueue", bound=TaskQueue)
 def carry_out(
     communicator: Intracomm,
     ranks_per_run: int,
-    store: Store,
+    store: StoreOnRank,
     begin: Callable[[], SomeTaskQueue],
     publish: Callable[[SomeTaskQueue, JobProgress], None],
     conclude: Callable[[SomeTaskQueue], Result],
@@ -145,7 +147,9 @@ def carry_out(
         with abort_guard(everyone):
             usage = Usage(leaders.Get_size(), time.perf_counter)
             queue = begin()
-            dispatcher = Dispatcher(leaders, queue, store, lambda progress: publish(queue, progress), usage)
+            dispatcher = Dispatcher(
+                leaders, queue, whole_store(store), lambda progress: publish(queue, progress), usage
+            )
             cost = dispatcher.run()
             return conclude(queue), cost
 

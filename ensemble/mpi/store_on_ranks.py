@@ -15,9 +15,25 @@ if TYPE_CHECKING:
 
     from ensemble.store import RunStaging, Store
 
+    StoreOnRank = Store | RunStaging  # the store on the first rank, where runs are staged on the others
+
+
+def whole_store(store: StoreOnRank) -> Store:
+    """Return the store that the first rank has.
+
+    Parameters
+    ----------
+    store : Store or RunStaging
+        From `store_on_ranks`, on the first rank.
+    """
+    from ensemble.store import Store
+
+    assert isinstance(store, Store), "only the first rank has the whole store"
+    return store
+
 
 @contextmanager
-def store_on_ranks(communicator: Intracomm, path: Path) -> Iterator[Store | RunStaging]:
+def store_on_ranks(communicator: Intracomm, path: Path) -> Iterator[StoreOnRank]:
     """Open a store to write to, on all ranks of a communicator.
 
     Only the first rank has a connection to the catalog: SQLite files on a network file system must be used

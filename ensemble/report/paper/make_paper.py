@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from ensemble.cli.progress import progress_text
 from ensemble.mpi.run_study import Snapshot, run_batch, run_study
+from ensemble.mpi.store_on_ranks import whole_store
 from ensemble.report import ReportName
 from ensemble.report.paper.comparison import Comparison
 from ensemble.report.paper.paper_document import Paper, PaperSection, ReportFigure
@@ -19,15 +20,16 @@ from ensemble.report.paper.section import Section, SectionContent, SectionFigure
 from ensemble.report.report_files import FinishedReport, report_directory, write_report
 from ensemble.report.report_model import Machine
 from ensemble.report.report_progress import Tell
-from ensemble.store import Store
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
 
+    from ensemble.mpi.store_on_ranks import StoreOnRank
+
 
 def make_paper(
     communicator: Intracomm,
-    store: Store,
+    store: StoreOnRank,
     sections: Sequence[Section],
     quick: bool,
     log: Tell,
@@ -42,8 +44,8 @@ def make_paper(
     ----------
     communicator : Intracomm
         All ranks.
-    store : Store
-        The same on every rank.
+    store : Store or RunStaging
+        From `store_on_ranks`.
     sections : sequence of Section
         The sections to make.
     quick : bool
@@ -59,7 +61,7 @@ def make_paper(
         The report on rank 0; None elsewhere.
     """
     begin, runs = time.perf_counter(), 0
-    generators = _SectionGenerators(sections, Results(store), quick) if communicator.Get_rank() == 0 else None
+    generators = _SectionGenerators(sections, Results(whole_store(store)), quick) if communicator.Get_rank() == 0 else None
     while (plan := communicator.bcast(generators.next_plan() if generators else None)) is not None:
         runs += _make_runs(communicator, plan, store, log, ranks_per_run)
     if generators is None:
@@ -78,7 +80,7 @@ def make_paper(
         wall_seconds=time.perf_counter() - begin,
         parts=parts,
     )
-    report = FinishedReport(report_directory(store, ReportName.PAPER), paper, paper_text(paper))
+    report = FinishedReport(report_directory(whole_store(store), ReportName.PAPER), paper, paper_text(paper))
     write_report(report, figures, {"report.html": paper_page(paper)})
     return report
 
@@ -119,7 +121,7 @@ class _SectionGenerators:
 
 
 def _make_runs(
-    communicator: Intracomm, plan: SectionPlan, store: Store, log: Tell, ranks_per_run: int
+    communicator: Intracomm, plan: SectionPlan, store: StoreOnRank, log: Tell, ranks_per_run: int
 ) -> int:
     """Make the runs of a plan on all ranks, and return how many they are."""
     cost = run_batch(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ensemble.mpi.scaling_model import ScalingModel
+from ensemble.mpi.store_on_ranks import whole_store
 from ensemble.report import ReportName
 from ensemble.report.report_files import FinishedReport, report_directory, write_report
 from ensemble.report.report_model import Machine
@@ -25,17 +26,18 @@ from ensemble.report.scaling.scaling_document import Collective, Cost, Evaluatio
 from ensemble.report.scaling.scaling_figures import scaling_figures
 from ensemble.report.scaling.scaling_plan import FULL, POINTS, QUICK, ScalingPlan
 from ensemble.report.scaling.scaling_text import scaling_text
-from ensemble.store import Store
 from solver.scene import LARGEST_DENSE
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
 
+    from ensemble.mpi.store_on_ranks import StoreOnRank
+
 
 _ROUNDS = 3  # in which numbers of ranks take turns: a machine's speed changes within minutes
 
 
-def make_scaling(communicator: Intracomm, store: Store, quick: bool, tell: Tell) -> FinishedReport | None:
+def make_scaling(communicator: Intracomm, store: StoreOnRank, quick: bool, tell: Tell) -> FinishedReport | None:
     """Measure on 1, 2, 4, … and all ranks, then write ``reports/scaling/`` in the store.
 
     Collective.  The files are ``report.md``, ``report.json`` and the figures, as PNG and as SVG.
@@ -59,7 +61,7 @@ def make_scaling(communicator: Intracomm, store: Store, quick: bool, tell: Tell)
         return None
     figures = scaling_figures(document)
     text = scaling_text(document, [f"{name}.png" for name in figures])
-    report = FinishedReport(report_directory(store, ReportName.SCALING), document, text)
+    report = FinishedReport(report_directory(whole_store(store), ReportName.SCALING), document, text)
     write_report(report, figures)
     return report
 

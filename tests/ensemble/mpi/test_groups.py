@@ -156,7 +156,7 @@ from ensemble.search.task_queue import Task
 from ensemble.config.run_key import run_key
 from ensemble.mpi.world import abort_guard, world
 from ensemble.mpi.run_study import carry_out
-from ensemble.store import Store
+from ensemble.mpi.store_on_ranks import store_on_ranks
 from ensemble.config.documents import load_scene
 
 LONG, SHORT = (
@@ -196,10 +196,7 @@ communicator, path = world(), Path(sys.argv[1])
 if communicator.Get_rank() == int(sys.argv[2]):
     solver.simulation.simulate.simulate = broken
 with abort_guard(communicator):
-    if communicator.Get_rank() == 0:
-        Store.open(path).close()
-    communicator.barrier()
-    with Store.existing(path) as store:
+    with store_on_ranks(communicator, path) as store:
         queue, cost = carry_out(communicator, 2, store, MadeUpQueue, lambda *_: None, lambda queue: queue)
     print(f"runs {cost.runs}, cancelled {queue.cancellations};", end=" ")
 """

@@ -318,17 +318,15 @@ import sys
 from pathlib import Path
 from ensemble.mpi.world import world
 from ensemble.mpi.run_study import run_study
-from ensemble.store import Store
+from ensemble.mpi.store_on_ranks import store_on_ranks
 from ensemble.config.documents import load_study
 
 def explode(snapshot):
     raise RuntimeError("the coordinator broke")
 
 communicator = world()
-if communicator.Get_rank() == 0:
-    Store.open(Path(sys.argv[1])).close()
-communicator.barrier()
-run_study(communicator, load_study("critical-hamaker"), Store.existing(Path(sys.argv[1])), explode)
+with store_on_ranks(communicator, Path(sys.argv[1])) as store:
+    run_study(communicator, load_study("critical-hamaker"), store, explode)
 """
 
 

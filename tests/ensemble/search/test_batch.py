@@ -66,7 +66,7 @@ import json, sys
 from pathlib import Path
 from ensemble.mpi.world import abort_guard, world
 from ensemble.mpi.run_study import run_batch
-from ensemble.store import Store
+from ensemble.mpi.store_on_ranks import store_on_ranks
 from ensemble.config.documents import load_scene
 
 communicator = world()
@@ -76,10 +76,7 @@ with abort_guard(communicator):
         load_scene("vesicle-shear", [f"flow.rate={rate}", f"numerics.work_limit={limit}", *coarse])
         for rate, limit in [(0.3, 10000), (0.5, 10000), (0.7, 10000), (0.9, 20)]
     ]
-    if communicator.Get_rank() == 0:
-        Store.open(Path(sys.argv[1])).close()
-    communicator.barrier()
-    with Store.existing(Path(sys.argv[1])) as store:
+    with store_on_ranks(communicator, Path(sys.argv[1])) as store:
         seen = []
         cost = run_batch(communicator, scenes, store, lambda standing: seen.append(set(standing.running)))
         if communicator.Get_rank() == 0:

@@ -130,7 +130,7 @@ from ensemble.report.paper.case import Case, StudyCase
 from ensemble.report.paper.make_paper import make_paper
 from ensemble.report.paper.comparison import compare_numbers, compare_words, runs_of, study_runs
 from ensemble.report.paper.section import Section, SectionContent, SectionFigure, SectionPlan
-from ensemble.store import Store
+from ensemble.mpi.store_on_ranks import store_on_ranks
 
 def case(rate, limit=10000):
     return Case.of("vesicle-shear", {"flow.rate": rate, "numerics.points": 32, "numerics.work_limit": limit})
@@ -160,10 +160,7 @@ def boundary(quick):
 sections = [Section("a", "A", inclination), Section("b", "B", boundary)]
 communicator = world()
 with abort_guard(communicator):
-    if communicator.Get_rank() == 0:
-        Store.open(Path(sys.argv[1])).close()
-    communicator.barrier()
-    with Store.existing(Path(sys.argv[1])) as store:
+    with store_on_ranks(communicator, Path(sys.argv[1])) as store:
         report = make_paper(communicator, store, sections, True, lambda line: None)
     assert (report is None) == (communicator.Get_rank() != 0)
 """
