@@ -61,7 +61,11 @@ def make_paper(
         The report on rank 0; None elsewhere.
     """
     begin, runs = time.perf_counter(), 0
-    generators = _SectionGenerators(sections, Results(whole_store(store)), quick) if communicator.Get_rank() == 0 else None
+    generators = (
+        _SectionGenerators(sections, Results(whole_store(store)), quick)
+        if communicator.Get_rank() == 0
+        else None
+    )
     while (plan := communicator.bcast(generators.next_plan() if generators else None)) is not None:
         runs += _make_runs(communicator, plan, store, log, ranks_per_run)
     if generators is None:

@@ -37,7 +37,9 @@ if TYPE_CHECKING:
 _ROUNDS = 3  # in which numbers of ranks take turns: a machine's speed changes within minutes
 
 
-def make_scaling(communicator: Intracomm, store: StoreOnRank, quick: bool, tell: Tell) -> FinishedReport | None:
+def make_scaling(
+    communicator: Intracomm, store: StoreOnRank, quick: bool, tell: Tell
+) -> FinishedReport | None:
     """Measure on 1, 2, 4, … and all ranks, then write ``reports/scaling/`` in the store.
 
     Collective.  The files are ``report.md``, ``report.json`` and the figures, as PNG and as SVG.
