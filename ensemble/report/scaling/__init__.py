@@ -1,1 +1,1 @@
-"""How the time of an evaluation depends on ranks and vesicles, and what that predicts."""
+"""The scaling report: how the time of an evaluation depends on ranks and vesicles."""

@@ -14,16 +14,28 @@ from ensemble.report import ReportName
 from ensemble.report.report_files import FinishedReport, report_directory, write_report
 from ensemble.report.report_model import Machine
 from ensemble.report.report_progress import Tell
-from ensemble.report.scaling.measure import Measured, collectives, evaluation, pair_seconds, peak_memory
-from ensemble.report.scaling.model_fit import (
-    crossover,
-    model_of,
-    predictions,
-    recommendations,
-    with_fast_summation,
+from ensemble.report.scaling.scaling_document import (
+    CollectiveTime,
+    EvaluationCost,
+    Scaling,
+    SharedEvaluation,
+    WeakScaling,
 )
-from ensemble.report.scaling.scaling_document import Collective, Cost, Evaluation, Scaling, Weak
 from ensemble.report.scaling.scaling_figures import scaling_figures
+from ensemble.report.scaling.scaling_fit import (
+    fast_summation_seconds,
+    fit_model,
+    predict_efficiencies,
+    recommend_ranks,
+    summation_crossover,
+)
+from ensemble.report.scaling.scaling_measurements import (
+    EvaluationMeasurement,
+    measure_collectives,
+    measure_evaluation,
+    measure_pair_seconds,
+    peak_memory,
+)
 from ensemble.report.scaling.scaling_plan import FULL, POINTS, QUICK, ScalingPlan
 from ensemble.report.scaling.scaling_text import scaling_text
 from solver.scene import LARGEST_DENSE
@@ -34,11 +46,11 @@ if TYPE_CHECKING:
     from ensemble.mpi.store_on_ranks import StoreOnRank
 
 
-_ROUNDS = 3  # in which numbers of ranks take turns: a machine's speed changes within minutes
+_ROUNDS = 3  # in which the numbers of ranks take turns, because a machine's speed changes within minutes
 
 
 def make_scaling(
-    communicator: Intracomm, store: StoreOnRank, quick: bool, tell: Tell
+    communicator: Intracomm, store: StoreOnRank, quick: bool, log: Tell
 ) -> FinishedReport | None:
     """Measure on 1, 2, 4, … and all ranks, then write ``reports/scaling/`` in the store.
 
@@ -47,18 +59,20 @@ def make_scaling(
     Parameters
     ----------
     communicator : Intracomm
-    store : Store
+        All ranks.
+    store : Store or RunStaging
+        From `ensemble.mpi.store_on_ranks.store_on_ranks`; it keeps the report.
     quick : bool
-        Fewer and smaller scenes.
-    tell : callable
-        Takes a line about every measurement, on the first rank.
+        Measure fewer and smaller scenes.
+    log : callable
+        Called on the first rank with one line of text before each measurement.
 
     Returns
     -------
-    FinishedReport
-        On the first rank; None elsewhere.
+    FinishedReport or None
+        The report on the first rank; None elsewhere.
     """
-    document = measured(communicator, QUICK if quick else FULL, tell)
+    document = measure_scaling(communicator, QUICK if quick else FULL, log)
     if document is None:
         return None
     figures = scaling_figures(document)
@@ -68,26 +82,43 @@ def make_scaling(
     return report
 
 
-def measured(communicator: Intracomm, plan: ScalingPlan, tell: Tell) -> Scaling | None:
-    """Measure everything and fit the model; None on all ranks but the first.  Collective."""
-    say = tell if communicator.Get_rank() == 0 else _say_nothing
-    sizes = _sizes(communicator.Get_size())
-    costs = _costs(communicator, plan, say)
-    evaluations: list[Evaluation] = []
+def measure_scaling(communicator: Intracomm, plan: ScalingPlan, log: Tell) -> Scaling | None:
+    """Measure everything that a plan names, and fit the scaling model.
+
+    Collective.
+
+    Parameters
+    ----------
+    communicator : Intracomm
+        All ranks.
+    plan : ScalingPlan
+        What to measure.
+    log : callable
+        Called on the first rank with one line of text before each measurement.
+
+    Returns
+    -------
+    Scaling or None
+        The report as data on the first rank; None elsewhere.
+    """
+    log = log if communicator.Get_rank() == 0 else _log_nothing
+    sizes = _numbers_of_ranks(communicator.Get_size())
+    costs = _measure_costs(communicator, plan, log)
+    evaluations: list[SharedEvaluation] = []
     for vesicles in plan.shared:
-        evaluations += _shared(communicator, vesicles, sizes, plan.repeats, say)
-    weak = _weak(communicator, plan, sizes, say)
-    gathered: list[Collective] = []
+        evaluations += _measure_shared(communicator, vesicles, sizes, plan.repeats, log)
+    weak = _measure_weak(communicator, plan, sizes, log)
+    collectives: list[CollectiveTime] = []
     for ranks in sizes[1:]:
-        say(f"collectives of {ranks} ranks")
-        gathered += collectives(communicator, ranks)
-    # Bound to a core, a rank sees that one alone.
+        log(f"collectives of {ranks} ranks")
+        collectives += measure_collectives(communicator, ranks)
+    # A rank that is bound to a core sees only this one.
     cores = len(set().union(*communicator.allgather(os.sched_getaffinity(0))))
     if communicator.Get_rank() != 0:
         return None
-    model = model_of(costs, evaluations, gathered)
-    evaluations = [_predicted(model, found) for found in evaluations]
-    fast = crossover(model, costs, pair_seconds())
+    model = fit_model(costs, evaluations, collectives)
+    evaluations = [_with_prediction(model, evaluation) for evaluation in evaluations]
+    crossover = summation_crossover(model, costs, measure_pair_seconds())
     return Scaling(
         machine=Machine.here(),
         ranks=communicator.Get_size(),
@@ -95,60 +126,64 @@ def measured(communicator: Intracomm, plan: ScalingPlan, tell: Tell) -> Scaling 
         oversubscribed=communicator.Get_size() > cores,
         evaluations=evaluations,
         weak=weak,
-        collectives=gathered,
+        collectives=collectives,
         model=model,
         largest_misprediction=max(
-            abs(found.predicted / found.seconds - 1) for found in evaluations if found.predicted is not None
+            abs(each.predicted / each.seconds - 1) for each in evaluations if each.predicted is not None
         ),
-        predictions=predictions(model),
-        recommendations=recommendations(model),
+        predictions=predict_efficiencies(model),
+        recommendations=recommend_ranks(model),
         costs=[
-            cost.model_copy(update={"with_fast_summation": with_fast_summation(model, fast, cost.vesicles)})
+            cost.model_copy(
+                update={"with_fast_summation": fast_summation_seconds(model, crossover, cost.vesicles)}
+            )
             for cost in costs
         ],
-        crossover=fast,
+        crossover=crossover,
     )
 
 
-def _say_nothing(line: str) -> None:
+def _log_nothing(line: str) -> None:
     pass
 
 
-def _sizes(ranks: int) -> list[int]:
-    """1, 2, 4, … and all ranks."""
-    return sorted({2**power for power in range(ranks.bit_length())} | {ranks})
+def _numbers_of_ranks(available: int) -> list[int]:
+    """Return 1, 2, 4, … and all ranks."""
+    return sorted({2**power for power in range(available.bit_length())} | {available})
 
 
-def _costs(communicator: Intracomm, plan: ScalingPlan, say: Tell) -> list[Cost]:
-    found = []
-    for vesicles in plan.alone:
-        say(f"{vesicles} vesicles alone")
-        one = evaluation(communicator, vesicles, 1, plan.repeats)
-        if one is not None:
-            found.append(
-                Cost(
+def _measure_costs(communicator: Intracomm, plan: ScalingPlan, log: Tell) -> list[EvaluationCost]:
+    costs = []
+    for vesicles in plan.single:
+        log(f"{vesicles} vesicles on one rank")
+        measurement = measure_evaluation(communicator, vesicles, 1, plan.repeats)
+        if measurement is not None:
+            costs.append(
+                EvaluationCost(
                     vesicles=vesicles,
-                    seconds=one.seconds,
-                    sums=one.sums,
+                    seconds=measurement.seconds,
+                    sums=measurement.sums,
                     peak_memory_bytes=peak_memory(),
                     with_fast_summation=None,
                 )
             )
-    return found
+    return costs
 
 
-def _shared(
-    communicator: Intracomm, vesicles: int, sizes: list[int], repeats: int, say: Tell
-) -> list[Evaluation]:
-    fastest: dict[int, Measured] = {}
+def _measure_shared(
+    communicator: Intracomm, vesicles: int, sizes: list[int], repeats: int, log: Tell
+) -> list[SharedEvaluation]:
+    fastest: dict[int, EvaluationMeasurement] = {}
     for _ in range(_ROUNDS):
         for ranks in sizes:
-            say(f"{vesicles} vesicles, ranks: {ranks}")
-            one = evaluation(communicator, vesicles, ranks, repeats)
-            if one is not None and (ranks not in fastest or one.seconds < fastest[ranks].seconds):
-                fastest[ranks] = one
+            log(f"{vesicles} vesicles, ranks: {ranks}")
+            measurement = measure_evaluation(communicator, vesicles, ranks, repeats)
+            if measurement is not None and (
+                ranks not in fastest or measurement.seconds < fastest[ranks].seconds
+            ):
+                fastest[ranks] = measurement
     return [
-        Evaluation(
+        SharedEvaluation(
             vesicles=vesicles,
             ranks=ranks,
             seconds=one.seconds,
@@ -162,22 +197,30 @@ def _shared(
     ]
 
 
-def _weak(communicator: Intracomm, plan: ScalingPlan, sizes: list[int], say: Tell) -> list[Weak]:
-    found: list[Weak] = []
+def _measure_weak(
+    communicator: Intracomm, plan: ScalingPlan, sizes: list[int], log: Tell
+) -> list[WeakScaling]:
+    measured: list[WeakScaling] = []
     for ranks in sizes:
         vesicles = round(plan.weak * math.sqrt(ranks))
-        say(f"{vesicles} vesicles, ranks: {ranks}, as many pairs on each as on one")
-        one = evaluation(communicator, vesicles, ranks, plan.repeats)
-        if one is not None:
-            alone = found[0].seconds if found else one.seconds
-            found.append(
-                Weak(vesicles=vesicles, ranks=ranks, seconds=one.seconds, efficiency=alone / one.seconds)
+        log(f"{vesicles} vesicles, ranks: {ranks}, as many pairs on each as on one")
+        measurement = measure_evaluation(communicator, vesicles, ranks, plan.repeats)
+        if measurement is not None:
+            on_one_rank = measured[0].seconds if measured else measurement.seconds
+            measured.append(
+                WeakScaling(
+                    vesicles=vesicles,
+                    ranks=ranks,
+                    seconds=measurement.seconds,
+                    efficiency=on_one_rank / measurement.seconds,
+                )
             )
-    return found
+    return measured
 
 
-def _predicted(model: ScalingModel, found: Evaluation) -> Evaluation:
-    """With the model's seconds, where the model holds: for scenes that keep no matrix of all points."""
-    if found.vesicles <= LARGEST_DENSE:
-        return found
-    return found.model_copy(update={"predicted": model.seconds(POINTS * found.vesicles, found.ranks)})
+def _with_prediction(model: ScalingModel, evaluation: SharedEvaluation) -> SharedEvaluation:
+    """Add the time by the model, which holds for scenes that keep no matrix over all points."""
+    if evaluation.vesicles <= LARGEST_DENSE:
+        return evaluation
+    seconds = model.seconds(POINTS * evaluation.vesicles, evaluation.ranks)
+    return evaluation.model_copy(update={"predicted": seconds})

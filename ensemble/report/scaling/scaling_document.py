@@ -6,15 +6,25 @@ from ensemble.mpi.scaling_model import ScalingModel
 from ensemble.report.report_model import Machine, ReportModel
 
 
-class Evaluation(ReportModel):
-    """One evaluation of the right-hand side, shared by ranks.
+class SharedEvaluation(ReportModel):
+    """One evaluation of the right-hand side that ranks share.
 
-    efficiency : speed-up over one rank, divided by the ranks.
-    kernels, collectives, solves, other : shares of its time on the first rank; waiting for other ranks is in
-        the collectives.
-    gathers, gathered_bytes : collectives in it, and what they bring together in all.
-    predicted : seconds, by the report's model.
-    difference : of the result from one rank's, relative to its largest entry.
+    Attributes
+    ----------
+    vesicles, ranks : int
+        Number of vesicles, and of ranks that share the evaluation.
+    seconds : float
+        Its time.
+    efficiency : float
+        Speed-up over one rank, divided by the number of ranks.
+    kernels, collectives, solves, other : float
+        Shares of its parts in its time, on the first rank; waiting for other ranks counts as collectives.
+    gathers, gathered_bytes : float
+        Collectives in it, and the bytes that they gather.
+    predicted : float or None
+        Its time by the model of the report; None where the model does not apply.
+    difference : float
+        Largest difference of the result from that of one rank, relative to its largest entry.
     """
 
     vesicles: int
@@ -31,8 +41,18 @@ class Evaluation(ReportModel):
     difference: float
 
 
-class Weak(ReportModel):
-    """An evaluation with as many pairs of points on each rank as on one alone."""
+class WeakScaling(ReportModel):
+    """An evaluation in which each rank has as many pairs of points as one rank alone.
+
+    Attributes
+    ----------
+    vesicles, ranks : int
+        Number of vesicles and of ranks.
+    seconds : float
+        Time of the evaluation.
+    efficiency : float
+        Time on one rank over this time.
+    """
 
     vesicles: int
     ranks: int
@@ -40,49 +60,96 @@ class Weak(ReportModel):
     efficiency: float
 
 
-class Collective(ReportModel):
-    """An Allgatherv that brings together this many bytes."""
+class CollectiveTime(ReportModel):
+    """An Allgatherv.
+
+    Attributes
+    ----------
+    ranks : int
+        Number of ranks.
+    gathered_bytes : int
+        Bytes that it gathers from all ranks.
+    seconds : float
+        Its time.
+    """
 
     ranks: int
     gathered_bytes: int
     seconds: float
 
 
-class Cost(ReportModel):
-    """What an evaluation costs one rank; memory is the largest that the process has had by then.
+class EvaluationCost(ReportModel):
+    """Cost of an evaluation on one rank.
 
-    sums : velocities of all points by all points in it.
+    Attributes
+    ----------
+    vesicles : int
+        Number of vesicles.
+    seconds : float
+        Time of the evaluation.
+    sums : float
+        How often it sums the velocities of all points from all points.
+    peak_memory_bytes : int
+        Largest memory of the process up to now.
+    with_fast_summation : float or None
+        Predicted time with a fast multipole method.
     """
 
     vesicles: int
     seconds: float
     sums: float
     peak_memory_bytes: int
-    with_fast_summation: float | None  # seconds, predicted
+    with_fast_summation: float | None
 
 
-class Prediction(ReportModel):
-    """Efficiency by the model at many ranks."""
+class EfficiencyPrediction(ReportModel):
+    """Efficiency by the model.
+
+    Attributes
+    ----------
+    vesicles, ranks : int
+        Number of vesicles and of ranks.
+    efficiency : float
+        Speed-up over one rank, divided by the number of ranks.
+    """
 
     vesicles: int
     ranks: int
     efficiency: float
 
 
-class Recommendation(ReportModel):
-    """The most ranks on which a run is efficient, of as many as there may be, by the model."""
+class RankRecommendation(ReportModel):
+    """The largest number of ranks on which a run is efficient by the model.
+
+    Attributes
+    ----------
+    vesicles, ranks : int
+        Number of vesicles and of ranks.
+    """
 
     vesicles: int
     ranks: int
 
 
-class Crossover(ReportModel):
-    """From where on a fast multipole method would sum faster than series of vesicles and their near points.
+class SummationCrossover(ReportModel):
+    """The number of vesicles beyond which a fast multipole method would be faster.
 
-    pairs_a_point : what it costs for each point, in pairs of the direct sum.
-    pair_seconds : of a pair of the direct sum.
-    point_seconds : of all its sums in an evaluation, for each point.
-    vesicles : None where the measured times do not grow like the pairs.
+    It is compared with series of whole vesicles and sums over their near points.
+
+    Attributes
+    ----------
+    terms : int
+        Terms of its expansions.
+    pairs_a_point : float
+        Its cost for each point, in pairs of the direct sum.
+    pair_seconds : float
+        Time of one pair of the direct sum.
+    point_seconds : float
+        Time of all its sums in an evaluation, for each point.
+    vesicles : int or None
+        None where the measured times do not grow like the number of pairs.
+    assumption : str
+        The source of the cost, and what is assumed.
     """
 
     terms: int
@@ -94,19 +161,51 @@ class Crossover(ReportModel):
 
 
 class Scaling(ReportModel):
-    """The whole report."""
+    """The whole report.
+
+    Attributes
+    ----------
+    report : str
+        Name of the report.
+    machine : Machine
+        The computer that made it.
+    ranks : int
+        Number of all ranks.
+    points : int
+        Points on each vesicle.
+    oversubscribed : bool
+        Whether there are more ranks than processor cores.
+    evaluations : list of SharedEvaluation
+        By number of vesicles and of ranks.
+    weak : list of WeakScaling
+        By number of ranks.
+    collectives : list of CollectiveTime
+        By number of ranks and size.
+    model : ScalingModel
+        Fitted to all these times.
+    largest_misprediction : float
+        Largest relative difference of a time by the model from the measured one.
+    predictions : list of EfficiencyPrediction
+        For more ranks than there are.
+    recommendations : list of RankRecommendation
+        By number of vesicles.
+    costs : list of EvaluationCost
+        By number of vesicles.
+    crossover : SummationCrossover
+        Where a fast multipole method would be faster.
+    """
 
     report: str = "scaling"
     machine: Machine
     ranks: int
     points: int
     oversubscribed: bool
-    evaluations: list[Evaluation]
-    weak: list[Weak]
-    collectives: list[Collective]
+    evaluations: list[SharedEvaluation]
+    weak: list[WeakScaling]
+    collectives: list[CollectiveTime]
     model: ScalingModel
     largest_misprediction: float
-    predictions: list[Prediction]
-    recommendations: list[Recommendation]
-    costs: list[Cost]
-    crossover: Crossover
+    predictions: list[EfficiencyPrediction]
+    recommendations: list[RankRecommendation]
+    costs: list[EvaluationCost]
+    crossover: SummationCrossover

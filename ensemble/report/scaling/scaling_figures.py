@@ -7,15 +7,27 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ensemble.figures.style import BLACK, BLUE, GRAY, GREEN, ORANGE, PURPLE, SKY, STYLE, VERMILLION, WIDTH
-from ensemble.report.scaling.profile import PARTS
 from ensemble.report.scaling.scaling_document import Scaling
+from ensemble.report.scaling.time_shares import PARTS
 
 _COLORS = (BLACK, BLUE, VERMILLION, GREEN, PURPLE, ORANGE)
 _PART_COLORS = dict(zip(PARTS, (BLUE, VERMILLION, GREEN, GRAY), strict=True))
 
 
 def scaling_figures(report: Scaling) -> dict[str, Figure]:
-    """Draw efficiency against ranks, the parts of an evaluation's time, and cost against vesicles."""
+    """Draw the report.
+
+    Parameters
+    ----------
+    report : Scaling
+        The report as data.
+
+    Returns
+    -------
+    dict of str to Figure
+        Figures by name: efficiency against ranks, the parts of the time of an evaluation, and cost against
+        the number of vesicles.
+    """
     return {"efficiency": _efficiency(report), "parts": _parts(report), "cost": _cost(report)}
 
 
@@ -25,8 +37,8 @@ def _efficiency(report: Scaling) -> Figure:
     axes = figure.subplots()
     axes.set(xscale="log", xlabel="ranks", ylabel="parallel efficiency", ylim=(0, 1.1))
     ranks = np.unique(np.geomspace(1, 10_000, 200).astype(int))
-    measured_of = {point.vesicles for point in report.evaluations}
-    numbers = sorted(measured_of | {point.vesicles for point in report.predictions})
+    measured_numbers = {point.vesicles for point in report.evaluations}
+    numbers = sorted(measured_numbers | {point.vesicles for point in report.predictions})
     for color, vesicles in zip(_COLORS, numbers, strict=False):
         label = f"{vesicles} vesicles"
         if any(point.vesicles == vesicles for point in report.predictions):

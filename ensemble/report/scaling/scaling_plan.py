@@ -12,27 +12,45 @@ POINTS = 64  # on each vesicle
 
 @dataclass(frozen=True)
 class ScalingPlan:
-    """Numbers of vesicles, and how often each evaluation is repeated.
+    """Numbers of vesicles to measure.
 
-    shared : by all numbers of ranks.
-    alone : by one rank, for cost and memory, ascending.
-    weak : by one rank, and by G ranks times √G, so that each has the same pairs.
+    Attributes
+    ----------
+    shared : tuple of int
+        Measured on every number of ranks.
+    single : tuple of int
+        Measured on one rank, for cost and memory; ascending.
+    weak : int
+        Measured on one rank, and √G times as many on G ranks, so that each rank has the same pairs.
+    repeats : int
+        How often each evaluation is repeated.
     """
 
     shared: tuple[int, ...]
-    alone: tuple[int, ...]
+    single: tuple[int, ...]
     weak: int
     repeats: int
 
 
-QUICK = ScalingPlan(shared=(2, 16, 64), alone=(2, 8, 16, 32, 64, 128), weak=32, repeats=6)
+QUICK = ScalingPlan(shared=(2, 16, 64), single=(2, 8, 16, 32, 64, 128), weak=32, repeats=6)
 FULL = ScalingPlan(
-    shared=(2, 16, 64, 256), alone=(2, 8, 16, 32, 64, 128, 256, 512, 1024), weak=64, repeats=12
+    shared=(2, 16, 64, 256), single=(2, 8, 16, 32, 64, 128, 256, 512, 1024), weak=64, repeats=12
 )
 
 
 def suspension(vesicles: int) -> Scene:
-    """Adhering vesicles in shear: the published pair, or as many at random, filling a fifth of a square."""
+    """Return adhering vesicles in shear.
+
+    Parameters
+    ----------
+    vesicles : int
+        Their number.
+
+    Returns
+    -------
+    Scene
+        The published pair, or vesicles at random places that fill a fifth of a square.
+    """
     pair = (Vesicle(center=(-1.5, 0.0)), Vesicle(center=(1.5, 0.0)))
     placed = pair if vesicles == 2 else Random(count=vesicles, area_fraction=0.2, seed=1).vesicles()
     return Scene(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ensemble.mpi.scaling_model import LEAST_EFFICIENCY, ScalingModel
-from ensemble.report.markdown_table import table
+from ensemble.report.markdown_table import image_links, table
 from ensemble.report.scaling.scaling_document import Scaling
 
 _EVALUATION = {
@@ -35,23 +35,35 @@ _PREDICTION = {"vesicles": "vesicles", "ranks": "ranks", "efficiency": "efficien
 
 
 def scaling_text(report: Scaling, figures: Sequence[str]) -> str:
-    """Return the report, with figures in these files."""
+    """Return the report as Markdown.
+
+    Parameters
+    ----------
+    report : Scaling
+        The report as data.
+    figures : sequence of str
+        Names of the image files to show.
+
+    Returns
+    -------
+    str
+        The text.
+    """
     model, crossover = report.model, report.crossover
     pays = f"beyond {crossover.vesicles} vesicles" if crossover.vesicles else "for no number measured"
-    crowded = "  There are more ranks than cores: times say nothing, only results do." * report.oversubscribed
+    crowded = "  There are more ranks than cores, so the times mean nothing." * report.oversubscribed
     sections = [
         "# Scaling",
         f"Made on: {report.machine.sentence()}; {report.ranks} ranks, one thread each.{crowded}  "
-        f"Evaluations of the right-hand side, {report.points} points on each vesicle: adhering "
-        "vesicles in shear, at random places in a square of which they fill a fifth (2: the published pair, "
-        "of which one is computed).  "
-        "The least of several times each; compiling is not timed.",
-        *(f"![{name}]({name})" for name in figures),
+        f"Evaluations of the right-hand side, {report.points} points on each vesicle: adhering vesicles in "
+        "shear, at random places in a square of which they fill a fifth (2: the published pair, of which one "
+        "is computed).  Each time is the least of several; compilation is not timed.",
+        *image_links(figures),
         "## Strong scaling",
-        "Shares of the time are those of the first rank, profiled; waiting for others is in the collectives.",
+        "Shares of the time are those of the first rank, profiled; waiting for others counts as collectives.",
         table(_EVALUATION, report.evaluations),
         "## Weak scaling",
-        "As many pairs of points on each rank: vesicles grow like the root of the ranks.",
+        "As many pairs of points on each rank: the number of vesicles grows like the root of that of ranks.",
         table(_WEAK, report.weak),
         "## Collectives",
         f"Allgatherv; latency {model.latency:.2g} s, bandwidth {model.bandwidth:.2g} bytes/s.",
@@ -76,7 +88,7 @@ def scaling_text(report: Scaling, figures: Sequence[str]) -> str:
 
 
 def _constants(model: ScalingModel) -> str:
-    """The constants of the time that is computed, and how often and how much is exchanged."""
+    """Return the constants of computed times, and how often and how much is exchanged."""
     seconds = {name: getattr(model, name) for name in ("pair", "point", "repeated", "fixed")}
     each = [f"{name} = {value:.3g} s" for name, value in seconds.items()]
     return ", ".join([*each, f"gathers = {model.gathers:.3g}", f"bytes = {model.bytes_a_point:.3g}"])

@@ -11,13 +11,23 @@ import pytest
 from ensemble.config.documents import load_scene
 from ensemble.figures import save
 from ensemble.mpi.scaling_model import LEAST_EFFICIENCY, MEASURED, ScalingModel, recommended_ranks
-from ensemble.report.scaling.counting import Counted
-from ensemble.report.scaling.model_fit import crossover, model_of, recommendations, with_fast_summation
-from ensemble.report.scaling.profile import PARTS, shares_of_time
-from ensemble.report.scaling.scaling_document import Collective, Cost, Evaluation, Scaling
+from ensemble.report.scaling.counting_ranks import CountingRanks
+from ensemble.report.scaling.scaling_document import (
+    CollectiveTime,
+    EvaluationCost,
+    Scaling,
+    SharedEvaluation,
+)
 from ensemble.report.scaling.scaling_figures import scaling_figures
+from ensemble.report.scaling.scaling_fit import (
+    fast_summation_seconds,
+    fit_model,
+    recommend_ranks,
+    summation_crossover,
+)
 from ensemble.report.scaling.scaling_plan import FULL, POINTS, QUICK, suspension
 from ensemble.report.scaling.scaling_text import scaling_text
+from ensemble.report.scaling.time_shares import PARTS, time_shares
 from solver.parallel import SERIAL
 
 KNOWN = ScalingModel(
@@ -46,7 +56,7 @@ def test_an_evaluation_takes_at_least_what_every_rank_repeats_and_exchanges():
     assert KNOWN.seconds(4096, 2**20) == pytest.approx(floor, rel=1e-3)
 
 
-def evaluation(vesicles: int, ranks: int, **fields: float) -> Evaluation:
+def evaluation(vesicles: int, ranks: int, **fields: float) -> SharedEvaluation:
     gathered = KNOWN.gathers * KNOWN.bytes_a_point * POINTS * vesicles
     values = {
         "seconds": KNOWN.seconds(POINTS * vesicles, ranks),
@@ -56,11 +66,11 @@ def evaluation(vesicles: int, ranks: int, **fields: float) -> Evaluation:
         "difference": 0.0,
         **dict.fromkeys(PARTS, 0.25),
     }
-    return Evaluation(vesicles=vesicles, ranks=ranks, **values | fields)
+    return SharedEvaluation(vesicles=vesicles, ranks=ranks, **values | fields)
 
 
 COSTS = [
-    Cost(
+    EvaluationCost(
         vesicles=vesicles,
         seconds=KNOWN.seconds(POINTS * vesicles, 1),
         sums=8.0,
@@ -73,7 +83,7 @@ COSTS = [
 
 def test_a_model_is_recovered_from_its_own_times():
     collectives = [
-        Collective(
+        CollectiveTime(
             ranks=ranks,
             gathered_bytes=size,
             seconds=1e-5 * math.ceil(math.log2(ranks)) + size * (ranks - 1) / ranks / 1e9,
@@ -81,13 +91,13 @@ def test_a_model_is_recovered_from_its_own_times():
         for ranks in (2, 4)
         for size in (16, 1024, 10**6)
     ]
-    model = model_of(COSTS, [evaluation(16, 2), evaluation(64, 2)], collectives)
+    model = fit_model(COSTS, [evaluation(16, 2), evaluation(64, 2)], collectives)
     for name, value in KNOWN.model_dump().items():
         assert getattr(model, name) == pytest.approx(value, rel=1e-6), name
 
 
 def test_the_recommendation_is_the_last_efficient_number_of_ranks():
-    for found in recommendations(KNOWN):
+    for found in recommend_ranks(KNOWN):
         points = POINTS * found.vesicles
         assert found.ranks == 1 or KNOWN.efficiency(points, found.ranks) >= LEAST_EFFICIENCY
         assert found.ranks == 10_000 or KNOWN.efficiency(points, found.ranks + 1) < LEAST_EFFICIENCY
@@ -96,15 +106,15 @@ def test_the_recommendation_is_the_last_efficient_number_of_ranks():
 
 
 def test_fast_summation_pays_beyond_the_crossover():
-    found = crossover(KNOWN, COSTS, pair_seconds=2e-9)
+    found = summation_crossover(KNOWN, COSTS, pair_seconds=2e-9)
     assert found.pairs_a_point == pytest.approx(3 * 2 * 9 * math.sqrt(3) * found.terms)
     assert found.point_seconds == pytest.approx(8 * 2e-9 * found.pairs_a_point)
     for vesicles, pays in ((found.vesicles // 2, False), (2 * found.vesicles, True)):
-        assert (with_fast_summation(KNOWN, found, vesicles) < KNOWN.seconds(POINTS * vesicles, 1)) is pays
+        assert (fast_summation_seconds(KNOWN, found, vesicles) < KNOWN.seconds(POINTS * vesicles, 1)) is pays
 
 
 def test_what_is_gathered_is_counted():
-    counted = Counted(SERIAL)
+    counted = CountingRanks(SERIAL)
     shares = counted.divide(5)
     assert shares.own == slice(0, 5)
     part = np.arange(10.0).reshape(5, 2)
@@ -116,7 +126,7 @@ def test_what_is_gathered_is_counted():
 
 
 def test_the_parts_of_an_evaluation_are_its_whole_time():
-    shares = shares_of_time(lambda: Counted(SERIAL).divide(3).gather(np.zeros((3, 2))))
+    shares = time_shares(lambda: CountingRanks(SERIAL).divide(3).gather(np.zeros((3, 2))))
     assert shares.keys() == set(PARTS)
     assert sum(shares.values()) == pytest.approx(1.0)
     assert shares["collectives"] > 0
@@ -124,8 +134,8 @@ def test_the_parts_of_an_evaluation_are_its_whole_time():
 
 @pytest.mark.parametrize("plan", [QUICK, FULL])
 def test_plans_reach_from_a_pair_to_many(plan):
-    assert plan.shared[0] == plan.alone[0] == 2
-    assert list(plan.alone) == sorted(plan.alone)
+    assert plan.shared[0] == plan.single[0] == 2
+    assert list(plan.single) == sorted(plan.single)
     assert suspension(2).vesicles == load_scene("doublet-shear").vesicles
     assert len(suspension(16).vesicles) == 16
 
@@ -134,12 +144,12 @@ MEASURING = """
 import sys
 from pathlib import Path
 from ensemble.mpi.world import abort_guard, world
-from ensemble.report.scaling.make_scaling import measured
+from ensemble.report.scaling.make_scaling import measure_scaling
 from ensemble.report.scaling.scaling_plan import ScalingPlan
 communicator = world()
 with abort_guard(communicator):
-    plan = ScalingPlan(shared=(2, 8), alone=(2, 8, 12), weak=8, repeats=1)
-    document = measured(communicator, plan, lambda line: None)
+    plan = ScalingPlan(shared=(2, 8), single=(2, 8, 12), weak=8, repeats=1)
+    document = measure_scaling(communicator, plan, lambda line: None)
     assert (document is None) == (communicator.Get_rank() > 0)
     if document is not None:
         Path(sys.argv[1]).write_text(document.model_dump_json())
