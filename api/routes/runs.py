@@ -10,6 +10,7 @@ from fastapi import APIRouter, Path, Query, Request, Response
 from api.http.caching import IMMUTABLE, NOT_MODIFIED, cached_response, etag, json_response
 from api.http.paging import After, CollectionPage, Limit, Where, page_response
 from api.http.problems import documented
+from api.results.flow_field import FlowField, flow_field
 from api.results.run_arrays import (
     FramesDocument,
     SeriesDocument,
@@ -166,3 +167,30 @@ def get_frames(
 
     tag = etag(key, "frames", f"{start}:{stop}:{stride}:{is_binary}")
     return cached_response(request, tag, IMMUTABLE, make)
+
+
+@router.get("/{key}/flow", response_model=FlowField | None, responses=RUN_RESPONSES)
+def get_flow(request: Request, reader: Reader, key: RunKey) -> Response:
+    """Give the imposed velocity around the vesicles of a run; null in a fluid at rest.
+
+    Parameters
+    ----------
+    request : Request
+    reader : Caller
+    key : str
+
+    Returns
+    -------
+    Response
+
+    Raises
+    ------
+    NotStored
+        If there is no run of this key.
+    """
+
+    def make() -> Response:
+        field = flow_field(reader.service.store.load(key))
+        return json_response("null" if field is None else field)
+
+    return cached_response(request, etag(key, "flow"), IMMUTABLE, make)

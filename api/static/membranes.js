@@ -1,7 +1,6 @@
 /** Draws states on a canvas: membranes colored by tension, arrows of the flow, a color bar and a scale. */
 
 import { tensionColor, tensionRange } from "./colormap.js";
-import { velocityGradient } from "./flow.js";
 import { number } from "./format.js";
 import { color, isDark } from "./theme.js";
 
@@ -25,13 +24,13 @@ const BAR = { width: 180, height: 8 };
 export class MembraneCanvas {
   /**
    * @param {HTMLCanvasElement} canvas
-   * @param {any} scene
    * @param {Frames} frames
+   * @param {import("./flow.js").ImposedFlow | null} flow - Null in a fluid at rest.
    */
-  constructor(canvas, scene, frames) {
+  constructor(canvas, frames, flow) {
     this.canvas = canvas;
     this.context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
-    this.gradient = velocityGradient(scene);
+    this.flow = flow;
     this.range = tensionRange(frames.states);
     this.reach = reachOf(frames.states);
     this.style = pageStyle();
@@ -52,7 +51,7 @@ export class MembraneCanvas {
     const [x, y] = meanCenter(state);
     const [left, top] = [width / 2, (height - FOOT) / 2];
     context.clearRect(0, 0, width, height);
-    this.#drawFlow(width, height - FOOT);
+    this.#drawFlow(width, height - FOOT, scale, [x, y]);
     const outlines = state.membranes.map((membrane) => ({
       x: membrane.x.map((value) => left + scale * (value - x)),
       y: membrane.y.map((value) => top - scale * (value - y)),
@@ -124,23 +123,32 @@ export class MembraneCanvas {
    *
    * @param {number} width
    * @param {number} height
+   * @param {number} scale - Pixels in the unit of length.
+   * @param {[number, number]} middle - The place that is shown in the middle.
    */
-  #drawFlow(width, height) {
-    if (this.gradient === null) {
+  #drawFlow(width, height, scale, [middleX, middleY]) {
+    const { flow } = this;
+    if (flow === null) {
       return;
     }
-    const [[xx, xy], [yx, yy]] = this.gradient;
     const [columns, rows] = [Math.floor(width / ARROWS_APART), Math.floor(height / ARROWS_APART)];
-    const corner = Math.hypot((xx * width + xy * height) / 2, (yx * width + yy * height) / 2);
+    const [u, v] = flow.at(middleX, middleY);
+    const relative = (/** @type {number} */ x, /** @type {number} */ y) => {
+      const [there, upThere] = flow.at(middleX + x / scale, middleY + y / scale);
+      return [there - u, upThere - v];
+    };
+    const corners = [-1, 1].flatMap((side) =>
+      [-1, 1].map((end) => Math.hypot(...relative((side * width) / 2, (end * height) / 2))),
+    );
+    const stretch = LONGEST_ARROW / Math.max(...corners);
     this.context.strokeStyle = this.style.arrows;
     this.context.lineWidth = 1.2;
     for (let row = 0; row < rows; row += 1) {
       for (let column = 0; column < columns; column += 1) {
         const x = (column - (columns - 1) / 2) * ARROWS_APART;
         const y = ((rows - 1) / 2 - row) * ARROWS_APART;
-        const stretch = LONGEST_ARROW / corner;
-        const [dx, dy] = [stretch * (xx * x + xy * y), -stretch * (yx * x + yy * y)];
-        this.#drawArrow(width / 2 + x - dx / 2, height / 2 - y - dy / 2, dx, dy);
+        const [dx, dy] = relative(x, y).map((speed) => stretch * speed);
+        this.#drawArrow(width / 2 + x - dx / 2, height / 2 - y + dy / 2, dx, -dy);
       }
     }
   }

@@ -18,11 +18,11 @@ export class Player extends EventTarget {
   #lastTick = null;
 
   /**
-   * @param {any} scene
    * @param {Frames} frames
+   * @param {import("./flow.js").ImposedFlow | null} flow
    * @param {AbortSignal} signal - Stops it.
    */
-  constructor(scene, frames, signal) {
+  constructor(frames, flow, signal) {
     super();
     this.frames = frames;
     this.signal = signal;
@@ -32,7 +32,7 @@ export class Player extends EventTarget {
 
     const canvas = element("canvas", { role: "img", tabindex: 0 });
     this.canvas = canvas;
-    this.membranes = new MembraneCanvas(canvas, scene, frames);
+    this.membranes = new MembraneCanvas(canvas, frames, flow);
     this.button = element("button", { class: "primary play", onclick: () => this.#toggle() });
     this.clock = element("output", { class: "clock" });
     this.scrubber = element("input", {

@@ -1,5 +1,6 @@
 /** Names and symbols, as the field writes them, of a scene's parameters. */
 
+import { getAll } from "./api.js";
 import { number } from "./format.js";
 
 /**
@@ -7,9 +8,6 @@ import { number } from "./format.js";
  * @property {string} name
  * @property {string} symbol - Plain text.
  */
-
-const SHEAR_RATE = { name: "shear rate", symbol: "γ̇" };
-const EXTENSION_RATE = { name: "extension rate", symbol: "ε̇" };
 
 /** @type {Record<string, Quantity>} */
 const BY_PATH = {
@@ -24,8 +22,27 @@ const BY_PATH = {
 
 const MOST_NUMBERS = 3; // that are listed
 
-/** @type {Record<string, string>} */
-const FLOWS = { shear: "shear flow", extension: "extensional flow", trap: "a fluid trap" };
+const OF_THE_FLOW = "flow.";
+
+/**
+ * Imposed flows by kind, as the service describes them.
+ *
+ * @type {Map<string, {title: string, parameters: Record<string, Quantity>}>}
+ */
+const flows = new Map();
+
+/**
+ * Ask for the imposed flows, once; `quantity` and `describe` need them.
+ *
+ * @param {AbortSignal} signal
+ */
+export async function loadFlows(signal) {
+  if (flows.size === 0) {
+    for (const flow of await getAll("/flows", signal)) {
+      flows.set(flow.kind, flow);
+    }
+  }
+}
 
 /**
  * The quantity at a dotted path of a scene; a path without an established symbol stands for itself.
@@ -35,10 +52,10 @@ const FLOWS = { shear: "shear flow", extension: "extensional flow", trap: "a flu
  * @returns {Quantity}
  */
 export function quantity(path, scene) {
-  if (path === "flow.rate") {
-    return scene.flow?.kind === "shear" ? SHEAR_RATE : EXTENSION_RATE;
-  }
-  return BY_PATH[path] ?? { name: path, symbol: path };
+  const ofFlow = path.startsWith(OF_THE_FLOW)
+    ? flows.get(scene.flow?.kind)?.parameters[path.slice(OF_THE_FLOW.length)]
+    : undefined;
+  return ofFlow ?? BY_PATH[path] ?? { name: path, symbol: path };
 }
 
 /**
@@ -53,9 +70,12 @@ export function describe(scene, without = []) {
     [...new Set(scene.vesicles.map((/** @type {any} */ vesicle) => vesicle[field] ?? 1))].sort((a, b) => a - b);
   const contrasts = of("viscosity_contrast");
   const cutoff = scene.adhesion?.cutoff ?? null;
+  const flow = flows.get(scene.flow?.kind);
   /** @type {[string, unknown[]][]} */
   const values = [
-    ["flow.rate", scene.flow ? [scene.flow.rate] : []],
+    ...Object.keys(flow?.parameters ?? {}).map(
+      (field) => /** @type {[string, unknown[]]} */ ([OF_THE_FLOW + field, [scene.flow[field]]]),
+    ),
     ["vesicles.reduced_area", of("reduced_area")],
     ["vesicles.viscosity_contrast", contrasts.every((contrast) => contrast === 1) ? [] : contrasts],
     ["adhesion.hamaker", scene.adhesion ? [scene.adhesion.hamaker] : []],
@@ -70,8 +90,7 @@ export function describe(scene, without = []) {
     );
   const count = scene.vesicles.length;
   const vesicles = count === 1 ? "1 vesicle" : `${count} vesicles`;
-  const flow = scene.flow ? FLOWS[scene.flow.kind] : "quiescent fluid";
-  return [`${vesicles} in ${flow}`, ...shown].join(", ");
+  return [`${vesicles} in ${flow?.title ?? "quiescent fluid"}`, ...shown].join(", ");
 }
 
 /**

@@ -39,7 +39,7 @@ class ImposedFlow(Model, ABC):
     symbols : mapping from field to Symbol
         The parameters that captions and axes name.
     odd : bool
-        Whether velocity(−x) = −velocity(x) while the vesicles' centers are reflected as well.  Only then may a
+        Whether velocity(−x) = −velocity(x) when the vesicles' centers are reflected, too.  Only then may a
         pair that a half turn leaves as it is be computed as one vesicle and its image.
     rotates : bool
         Whether the flow turns a pair, or a single vesicle, round and round.  Then a pair has a period and is

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+import numpy as np
 import pytest
 from playwright.sync_api import Browser, ConsoleMessage, Page, expect, sync_playwright
 
@@ -233,6 +234,22 @@ def test_states_between_frames_are_cubic(page: Page, url: str) -> None:
         values = page.evaluate(weights, time)
         assert sum(values) == pytest.approx(1)
         assert sum(value * at**2 for at, value in enumerate(values)) == pytest.approx(time**2)
+
+
+def test_the_flow_is_known_between_and_beyond_the_places_where_it_was_sampled(
+    page: Page, url: str, run: Run
+) -> None:
+    page.goto(url)
+    velocities = """async ([key, places]) => {
+        const { ImposedFlow } = await import('/assets/flow.js');
+        const flow = await ImposedFlow.of(key, new AbortController().signal);
+        return places.map(([x, y]) => flow.at(x, y));
+    }"""
+    places = [[0.3, -0.7], [2.1, 1.9], [-40.0, 55.0]]
+    answer = page.evaluate(velocities, [run_key(run.scene), places])
+    assert run.scene.flow is not None
+    expected = run.scene.flow.velocity(np.transpose(places), run.frames.center[0].T)
+    np.testing.assert_allclose(np.transpose(answer), expected, atol=1e-12)
 
 
 def test_a_long_run_comes_in_several_answers(page: Page, url: str, run: Run) -> None:

@@ -3,6 +3,7 @@
 import { get } from "../api.js";
 import { Cursor } from "../cursor.js";
 import { definitions, element } from "../dom.js";
+import { ImposedFlow } from "../flow.js";
 import { dateAndTime, duration, number } from "../format.js";
 import { Frames } from "../frames.js";
 import { MARGIN, histories } from "../history.js";
@@ -32,8 +33,9 @@ export async function showRun({ content, parameters, query, signal }) {
   );
 
   const loading = stage.appendChild(element("p", { class: "note", role: "status" }, "Loading the states…"));
-  const [frames, { series }] = await Promise.all([
+  const [frames, flow, { series }] = await Promise.all([
     Frames.of(run, signal),
+    ImposedFlow.of(key, signal),
     get(`/runs/${key}/series`, signal),
   ]);
   loading.remove();
@@ -43,7 +45,7 @@ export async function showRun({ content, parameters, query, signal }) {
     stage.append(element("p", { class: "alert" }, "This run has no state that could be drawn."));
     return drawn;
   }
-  const player = new Player(run.scene, frames, signal);
+  const player = new Player(frames, flow, signal);
   stage.append(player.element);
   player.canvas.setAttribute("aria-label", `${describe(run.scene)}: membranes colored by tension`);
   keepTime(player, query);

@@ -41,6 +41,8 @@ def test_every_route_is_described(paths):
         ("get", "/runs/{key}"),
         ("get", "/runs/{key}/series"),
         ("get", "/runs/{key}/frames"),
+        ("get", "/runs/{key}/flow"),
+        ("get", "/flows"),
         ("get", "/boundaries"),
         ("get", "/boundaries/{key}"),
         ("get", "/boundaries/{key}/at"),

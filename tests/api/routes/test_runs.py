@@ -160,7 +160,24 @@ def test_too_many_frames_at_once_are_refused_with_the_number(filled_store, bound
         assert client.get(f"/runs/{bound_run}/frames", params={"stride": 3}).json()["index"] == [0, 3, 6, 9]
 
 
-@pytest.mark.parametrize("part", ["", "/series", "/frames"])
+def test_the_flow_is_sampled_around_the_vesicles(reading, filled_store, bound_run):
+    with Store.existing(filled_store) as store:
+        run = store.load(bound_run)
+    field = reading.get(f"/runs/{bound_run}/flow").json()
+    x, y = np.meshgrid(field["x"], field["y"])
+    np.testing.assert_allclose(field["velocity"], [0.75 * y, 0 * x], atol=1e-12)
+    everywhere = positions(run.frames.tangent_angle, run.frames.center, 2 * np.pi)
+    for coordinate, values in zip("xy", np.moveaxis(everywhere, 2, 0), strict=True):
+        assert field[coordinate][0] < values.min() < values.max() < field[coordinate][-1]
+
+
+def test_a_fluid_at_rest_has_no_flow(reading):
+    (failed,) = found(reading, where="outcome=failed")
+    assert failed["scene"]["flow"] is None
+    assert reading.get(f"/runs/{failed['key']}/flow").json() is None
+
+
+@pytest.mark.parametrize("part", ["", "/series", "/frames", "/flow"])
 def test_what_never_changes_is_sent_once(reading, bound_run, part):
     first = reading.get(f"/runs/{bound_run}{part}")
     assert "immutable" in first.headers["cache-control"]
@@ -182,7 +199,7 @@ def test_tags_of_different_frames_differ(reading, bound_run):
     assert len({answer.headers["etag"] for answer in answers}) == len(answers)
 
 
-@pytest.mark.parametrize("part", ["", "/series", "/frames"])
+@pytest.mark.parametrize("part", ["", "/series", "/frames", "/flow"])
 def test_an_unknown_run_is_not_found(reading, part):
     response = reading.get(f"/runs/{'0' * 32}{part}")
     assert response.status_code == 404
