@@ -1,29 +1,52 @@
-"""Bending of a membrane with the Helfrich energy ½κ∫curvature² ds: f = −κ x_ssss (paper, section II)."""
+"""Bending of a membrane with the Helfrich energy ½κ∫curvature² ds: f = −κ x_ssss.
+
+(Quaife et al. 2019, section II.)
+"""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.membrane.geometry import Geometry
+from solver.membrane.geometry import Geometry, Membranes
 from solver.membrane.spectral import differentiation
 
 Array = NDArray[np.float64]
 
+# Tension of a circle, in modulus/radius²: under a strain of rate ½ it departs from its shape by 1e-6.
+_CIRCLE_TENSION = 1e6
+
 
 class Bending:
-    """Bending of all membranes; a `Force`."""
+    """Bending of all membranes."""
 
     def density(self, geometry: Geometry) -> Array:
-        """Force per length, (2, M, N)."""
+        """Compute the force per length, −κ x_ssss.
+
+        Parameters
+        ----------
+        geometry : Geometry
+
+        Returns
+        -------
+        (2, M, N)
+        """
         density = geometry.arclength_derivative(geometry.tangents, order=3)
         density *= -geometry.membranes.bending_modulus[:, None]
         return density
 
     def jacobian(self, geometry: Geometry) -> Array:
-        """Derivative of `density` by the state, (2, M·N, state).
+        """Differentiate `density` by the state.
 
         x_s = (cos θ, sin θ), so x_ssss depends on the tangent angles directly, without the points.
+
+        Parameters
+        ----------
+        geometry : Geometry
+
+        Returns
+        -------
+        (2, M·N, state_size)
         """
         membranes = geometry.membranes
         points = membranes.points
@@ -37,7 +60,84 @@ class Bending:
         return jacobian
 
     def energy(self, geometry: Geometry) -> float:
-        """½κ∫curvature² ds over all membranes."""
+        """Compute ½κ∫curvature² ds over all membranes, images included.
+
+        Parameters
+        ----------
+        geometry : Geometry
+
+        Returns
+        -------
+        float
+        """
         curvature_vector = geometry.arclength_derivative(geometry.tangents)
         square = np.sum(curvature_vector**2, axis=(0, 2)) * geometry.membranes.spacing
         return float(0.5 * geometry.membranes.copies * np.sum(geometry.membranes.bending_modulus * square))
+
+
+class BendingOfCircles(Bending):
+    """Bending, and on circular vesicles the constant tension that keeps them round.
+
+    A circle has the largest area for its length, so an inextensible one moves as a rigid body.  What holds it
+    against a strain is a constant tension without bound: it moves the membrane by as much as this is no
+    circle.  A large finite one leaves a small departure, in proportion to the strain, and makes the circle a
+    stable state, whatever the time step.
+
+    Parameters
+    ----------
+    membranes : Membranes
+    """
+
+    def __init__(self, membranes: Membranes) -> None:
+        scale = membranes.bending_modulus * membranes.wavenumber[:, 0] ** 2
+        self._tension = np.where(membranes.circular, _CIRCLE_TENSION * scale, 0.0)
+
+    def density(self, geometry: Geometry) -> Array:
+        """Compute the force per length, −κ x_ssss + σ x_ss.
+
+        Parameters
+        ----------
+        geometry : Geometry
+
+        Returns
+        -------
+        (2, M, N)
+        """
+        return super().density(geometry) + self._tension[:, None] * geometry.arclength_derivative(
+            geometry.tangents
+        )
+
+    def jacobian(self, geometry: Geometry) -> Array:
+        """Differentiate `density` by the state.
+
+        Parameters
+        ----------
+        geometry : Geometry
+
+        Returns
+        -------
+        (2, M·N, state_size)
+        """
+        jacobian = super().jacobian(geometry)
+        points = geometry.membranes.points
+        pull = self._tension * geometry.membranes.wavenumber[:, 0]
+        for vesicle in np.flatnonzero(geometry.membranes.circular):
+            block = slice(vesicle * points, (vesicle + 1) * points)
+            by_tangent = pull[vesicle] * differentiation(points)
+            jacobian[0, block, block] -= by_tangent * geometry.tangents[1, vesicle]
+            jacobian[1, block, block] += by_tangent * geometry.tangents[0, vesicle]
+        return jacobian
+
+
+def bending_of(membranes: Membranes) -> Bending:
+    """Make the bending of these membranes.
+
+    Parameters
+    ----------
+    membranes : Membranes
+
+    Returns
+    -------
+    Bending
+    """
+    return BendingOfCircles(membranes) if membranes.circular.any() else Bending()

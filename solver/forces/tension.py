@@ -65,12 +65,12 @@ class TensionInverse(NamedTuple):
     ----------
     matrix : (M·N, M·N) array
         Weighted with the spacing.
-    shift : float
-        What times the mean tension of a vesicle was added to A σ.
+    shifts : (M,) array
+        What times the mean tension of each vesicle was added to A σ.
     """
 
     matrix: Array
-    shift: float
+    shifts: Array
 
 
 @compiled
@@ -81,7 +81,7 @@ def _conjugate_gradients(
     wavenumber: Array,
     spacing: Array,
     inverse: Array,
-    shift: float,
+    shifts: Array,
     tolerance: float,
     natural_rate: float,
     limit: int,
@@ -93,9 +93,9 @@ def _conjugate_gradients(
     """Write what `Inextensible` holds; return the number of iterations, or −1 if ``limit`` was not enough.
 
     ``layer`` is the matrix of the single-layer potential, ``derivative`` the transposed one of
-    differentiation; ``wavenumber`` (M, 1) = 2π/length; ``shift`` times the mean tension is added to A σ;
-    ``imposed`` (2, M, N) is the velocity u₀ without tension, and ``natural_rate`` a stretching that counts as
-    large.
+    differentiation; ``wavenumber`` (M, 1) = 2π/length; ``shifts`` (M,) times the mean tension of each vesicle
+    are added to A σ; ``imposed`` (2, M, N) is the velocity u₀ without tension, and ``natural_rate`` a
+    stretching that counts as large.
     """
     count, points = tension.shape
     size = count * points
@@ -121,7 +121,7 @@ def _conjugate_gradients(
         image = (-(tangents[0] * gradient[0] + tangents[1] * gradient[1]) * weight).reshape(size)
         for vesicle in range(count):
             own = slice(vesicle * points, (vesicle + 1) * points)
-            image[own] += shift * direction[own].mean()
+            image[own] += shifts[vesicle] * direction[own].mean()
         step = product / np.dot(direction, image)
         solution += step * direction
         flow += step * change
@@ -146,9 +146,10 @@ class Inextensibility:
         Stretching left over, relative to that without tension or to `Membranes.natural_rate` if that is
         larger: in a state of rest there is no other scale.
     elasticity : float
-        How much a constant tension stretches a membrane, relative to a varying one.  On a circle such a
-        tension is a pressure that moves nothing: it must not be divided by round-off, nor by the error of
-        the sums over other membranes.  A vesicle whose ellipticity squared is below this gives way.
+        How much a constant tension stretches a membrane, relative to a varying one.  On a nearly circular
+        one it does next to nothing, and must not be divided by the error of the sums over other membranes.
+        A vesicle whose ellipticity squared is below this gives way.  On a circular vesicle a constant
+        tension is a pressure that moves nothing: it is projected out, and the tension has no mean.
 
     Attributes
     ----------
@@ -202,7 +203,7 @@ class Inextensibility:
                 membranes.wavenumber,
                 membranes.spacing[:, None],
                 inverse.matrix,
-                inverse.shift,
+                inverse.shifts,
                 self.tolerance,
                 membranes.natural_rate,
                 limit,
@@ -243,13 +244,13 @@ class Inextensibility:
         system = self.stretching(geometry, flow)
         system *= -np.repeat(membranes.spacing, points)[:, None]
         typical = np.trace(system) / (count * points)
-        shift = self._elasticity * typical
+        shifts = typical * np.where(membranes.circular, 1.0, self._elasticity)
         # Differentiation loses the highest mode, whose tension gets the weight of its neighbors.
         alternating = np.where(np.arange(points) % 2 == 0, 1.0, -1.0)
-        added = (shift + typical * np.outer(alternating, alternating)) / points
+        highest = typical * np.outer(alternating, alternating)
         for vesicle in range(count):
             block = slice(vesicle * points, (vesicle + 1) * points)
-            system[block, block] += added
+            system[block, block] += (shifts[vesicle] + highest) / points
         # The lower triangle is used alone: the operator is symmetric up to quadrature error.
         factor, failed = lapack.dpotrf(system.T, lower=0, overwrite_a=1)
         if failed:
@@ -257,7 +258,7 @@ class Inextensibility:
         triangle, _ = lapack.dpotri(factor, lower=0, overwrite_c=1)
         inverse = np.triu(triangle)
         inverse += np.triu(triangle, 1).T
-        return TensionInverse(np.ascontiguousarray(inverse), shift), flow
+        return TensionInverse(np.ascontiguousarray(inverse), shifts), flow
 
     @staticmethod
     def stretching(geometry: Geometry, velocity: Array) -> Array:

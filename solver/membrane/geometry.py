@@ -18,6 +18,8 @@ from solver.scene import Scene, Vesicle
 
 Array = NDArray[np.float64]
 
+ROUNDNESS = 1e-9  # deviation of the reduced area from 1 that is next to none: of the curvature, 3e-5
+
 
 @dataclass(frozen=True)
 class Membranes:
@@ -31,6 +33,8 @@ class Membranes:
     points : int
         N, on each vesicle.
     length, bending_modulus : (M,)
+    circular : (M,) of bool
+        Which vesicles have no area to spare: circles, up to `ROUNDNESS`.
     copies : int
         1, or 2 with images.
     """
@@ -38,6 +42,7 @@ class Membranes:
     points: int
     length: Array
     bending_modulus: Array
+    circular: NDArray[np.bool_]
     copies: int = 1
 
     @classmethod
@@ -60,6 +65,7 @@ class Membranes:
             points,
             np.array([vesicle.length for vesicle in vesicles]),
             np.array([vesicle.bending_modulus for vesicle in vesicles]),
+            np.array([vesicle.reduced_area > 1 - ROUNDNESS for vesicle in vesicles]),
             copies,
         )
 

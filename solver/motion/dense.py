@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from solver.flows import ImposedFlow
 from solver.forces.adhesion import Adhesion
-from solver.forces.bending import Bending
+from solver.forces.bending import Bending, bending_of
 from solver.forces.tension import ROUND_OFF, Inextensibility, TensionInverse
 from solver.forces.truncated_adhesion import TruncatedAdhesion
 from solver.membrane.geometry import Geometry, Membranes
@@ -109,7 +109,7 @@ class DenseEquation:
         differ = bool(np.any(contrast != 1))
         return cls(
             membranes=membranes,
-            bending=Bending(),
+            bending=bending_of(membranes),
             adhesion=_adhesion(scene.adhesion, accuracy, membranes, parallel) if several else None,
             flow=scene.flow,
             inextensibility=Inextensibility(accuracy, 1e-3 * accuracy if several else ROUND_OFF),

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.flows import ImposedFlow
-from solver.forces.bending import Bending
+from solver.forces.bending import Bending, bending_of
 from solver.forces.summed_adhesion import SummedAdhesion
 from solver.forces.summed_tension import Preconditioner, SummedInextensibility
 from solver.forces.tension import Inextensibility, TensionInverse, TensionNotFoundError
@@ -109,7 +109,7 @@ class SummedEquation:
             scene=scene,
             parallel=parallel,
             membranes=membranes,
-            bending=Bending(),
+            bending=bending_of(membranes),
             adhesion=_adhesion(scene.adhesion, accuracy, membranes, parallel),
             flow=scene.flow,
             inextensibility=SummedInextensibility(accuracy),
@@ -246,7 +246,7 @@ class SummedEquation:
         for k, vesicle in enumerate(mine):
             isolated, its_geometry = self._isolated(geometry, vesicle)
             try:
-                inverses[k], shifts[k] = invert(isolated, its_geometry, vesicle)
+                inverses[k], shifts[k : k + 1] = invert(isolated, its_geometry, vesicle)
             except TensionNotFoundError:
                 failed[k] = 1.0
         if (everywhere := shares.gather(failed)).any():

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import quad
 
-from solver.forces.bending import Bending
+from solver.forces.bending import Bending, bending_of
 from solver.membrane.geometry import Geometry
 from solver.scene import Numerics, Scene, Vesicle
 from solver.simulation.initial_state import initial_ellipses
@@ -113,3 +113,26 @@ def test_the_jacobian_is_exact() -> None:
     ).reshape(2, 64, len(state))
     jacobian = np.stack(bending.jacobian(geometry))
     np.testing.assert_allclose(jacobian, exact, rtol=0, atol=1e-9 * np.max(np.abs(exact)))
+
+
+def test_a_circle_keeps_its_shape_by_a_tension_that_an_ellipse_does_not_have() -> None:
+    """On a circle it is a pressure; against a departure from the circle it pulls."""
+    circle, _, _ = one(1.0, 32)
+    rounding = bending_of(circle.membranes)
+    pressure = rounding.density(circle) - Bending().density(circle)
+    size = np.sum(pressure * circle.normals, axis=0)
+    np.testing.assert_allclose(pressure, size.mean() * circle.normals, rtol=0, atol=1e-8 * size.mean())
+    assert size.mean() > 1e5 * np.max(np.abs(Bending().density(circle)))
+    ellipse, _, _ = one(0.9, 32)
+    assert type(bending_of(ellipse.membranes)) is Bending
+
+
+def test_the_jacobian_of_a_circle_is_exact() -> None:
+    geometry, _, _ = one(1.0, 32)
+    membranes, step = geometry.membranes, 1e-3
+    bending, direction = bending_of(membranes), smooth_direction(membranes)
+    state = membranes.pack(geometry.tangent_angle, geometry.centers.T)
+    around = [bending.density(Geometry(membranes, state + k * step * direction)) for k in (-2, -1, 1, 2)]
+    exact = np.tensordot(np.array([1, -8, 8, -1]) / (12 * step), around, axes=1).reshape(2, -1)
+    computed = bending.jacobian(geometry) @ direction
+    np.testing.assert_allclose(computed, exact, rtol=0, atol=1e-8 * np.max(np.abs(exact)))

@@ -10,6 +10,7 @@ from solver.forces.tension import ROUND_OFF, Inextensibility
 from solver.membrane.geometry import Geometry
 from solver.potentials.proximity import Closeness
 from solver.potentials.single_layer import SingleLayer
+from solver.potentials.viscosity_contrast import ViscosityContrast
 from solver.scene import Numerics, Scene, Vesicle
 from solver.simulation.initial_state import initial_ellipses
 from tests.solver.scenes import geometry_of, smooth_direction, uneven_pair
@@ -95,6 +96,23 @@ def test_the_tension_of_a_circle_in_shear() -> None:
     exact = -rate * radius / 4 * np.cos(2 * phi) * geometry.tangents
     np.testing.assert_allclose(velocity - imposed, exact, rtol=0, atol=1e-12)
     np.testing.assert_allclose(tension - tension.mean(), -rate * radius * np.sin(2 * phi), rtol=0, atol=1e-11)
+
+
+@pytest.mark.parametrize("points", [32, 64, 128])
+@pytest.mark.parametrize("contrast", [1e-4, 1e-2, 0.5, 30.0, 1e4, 1e6])
+def test_the_mean_tension_of_a_circle_is_projected_out(contrast: float, points: int) -> None:
+    """No eigenvalue of the operator is round-off, whatever the viscosity inside."""
+    vesicle = Vesicle(reduced_area=1.0, viscosity_contrast=contrast)
+    scene = Scene(horizon=1.0, vesicles=(vesicle,), numerics=Numerics(points=points))
+    geometry = geometry_of(scene)
+    layer = layer_of(geometry)
+    mobility = ViscosityContrast(np.array([contrast]), geometry.membranes, 1e-12)
+    mobility.assemble(geometry, None, layer)
+    (inverse, shifts), _ = Inextensibility(1e-12, ROUND_OFF).factorize(mobility, geometry)
+    eigenvalues = np.linalg.eigvalsh(inverse)
+    assert eigenvalues.max() < points * np.median(eigenvalues)
+    constant = np.full(points, points**-0.5)
+    np.testing.assert_allclose(inverse @ constant * shifts, constant, rtol=0, atol=1e-6)
 
 
 def test_the_inverse_of_another_geometry_changes_nothing_but_the_work() -> None:
