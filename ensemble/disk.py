@@ -5,9 +5,12 @@ from __future__ import annotations
 import errno
 import fcntl
 import os
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from uuid import uuid4
 
 # What file systems answer that do not flush directories (some network and user-space ones): their entries
 # are then as durable as the file system makes them.
@@ -69,6 +72,8 @@ def locked(path: Path) -> Iterator[None]:
 def replacing(path: Path) -> Iterator[Path]:
     """Yield a file to write, which takes the place of ``path`` when the block ends without an error.
 
+    The target of a link is replaced, and the link stays.  A pipe or a device is written to.
+
     Parameters
     ----------
     path : Path
@@ -77,11 +82,27 @@ def replacing(path: Path) -> Iterator[Path]:
     Yields
     ------
     Path
-        A hidden file in the same directory and with the same suffix.  A killed process leaves it behind.
+        A hidden file with the same suffix, for a file in the same directory.  A killed process leaves it
+        behind.
+
+    Raises
+    ------
+    OSError
+        If ``path`` is a directory, or cannot be written.
     """
-    unfinished = path.with_name(f".{os.getpid()}.{path.name}")
+    target = path.resolve()
+    if target.is_dir():
+        raise IsADirectoryError(errno.EISDIR, f"{path} is a directory")
+    if target.exists() and not target.is_file():
+        with TemporaryDirectory() as directory:
+            unfinished = Path(directory, f"output{path.suffix}")
+            yield unfinished
+            with unfinished.open("rb") as source, target.open("wb") as sink:
+                shutil.copyfileobj(source, sink)
+        return
+    unfinished = target.with_name(f".{uuid4().hex}{path.suffix}")
     try:
         yield unfinished
-        unfinished.replace(path)
+        unfinished.replace(target)
     finally:
         unfinished.unlink(missing_ok=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 from pathlib import Path
+from subprocess import CalledProcessError
 from typing import Any, Final, NamedTuple
 
 import imageio_ffmpeg
@@ -77,6 +78,8 @@ def save_movie(run: Run, path: Path) -> None:
     ------
     ValueError
         If the run has no finite state.
+    OSError
+        If the file cannot be written; it says what the encoder said.
     """
     form = _FORMATS[path.suffix.lower()]
     # The encoder is the one that a wheel brought, whatever the machine has.
@@ -84,10 +87,16 @@ def save_movie(run: Run, path: Path) -> None:
     with matplotlib.rc_context(STYLE), matplotlib.rc_context(encoder), replacing(path) as unfinished:
         picture = Picture(run, form.resolution)
         writer = form.writer(fps=form.rate, **form.options)
-        with writer.saving(picture.figure, str(unfinished), dpi=form.resolution):
-            for time in picture_times(picture.frames, form.rate):
-                picture.show(time)
-                writer.grab_frame()
+        try:
+            with writer.saving(picture.figure, str(unfinished), dpi=form.resolution):
+                for time in picture_times(picture.frames, form.rate):
+                    picture.show(time)
+                    writer.grab_frame()
+        except CalledProcessError as error:
+            words = (error.stderr or b"").decode(errors="replace").strip().splitlines()
+            raise OSError(
+                f"output: ffmpeg could not write {path} ({words[-1] if words else error})"
+            ) from error
 
 
 def picture_times(frames: Frames, rate: int) -> Array:

@@ -13,9 +13,28 @@ from solver.analysis.run import Outcome
 
 WIDTH: Final = 7.2  # inches, the text width of a two-column journal
 
-# Applied while a figure is built and again while it is written, since ticks are made as late as that.
+# Settings of the process, not of a figure: where windows appear, what keys do, where files are looked for.
+_OF_THE_PROCESS = (
+    "backend",
+    "interactive",
+    "toolbar",
+    "keymap",
+    "webagg",
+    "tk.",
+    "macosx",
+    "docstring",
+    "savefig.directory",
+)
+
+# Applied while a figure is built and again while it is written, since ticks are made as late as that.  It
+# begins with the defaults of the library: what a user has set for figures of their own changes none of these.
 STYLE: Final = matplotlib.RcParams(
     {
+        name: value
+        for name, value in matplotlib.rcParamsDefault.items()
+        if not name.startswith(_OF_THE_PROCESS)
+    }
+    | {
         "font.family": "STIXGeneral",
         "mathtext.fontset": "stix",
         "font.size": 10,

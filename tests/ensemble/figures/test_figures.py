@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -52,3 +53,49 @@ def test_figures_leave_no_global_state(tmp_path: Path) -> None:
     assert dict(matplotlib.rcParams) == before
     code = "import sys, ensemble.figures; sys.exit('matplotlib.pyplot' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_the_settings_of_a_user_change_no_figure(tmp_path: Path) -> None:
+    """A file of settings, such as people have in their home directory, that breaks or changes plots."""
+    (tmp_path / "matplotlibrc").write_text(
+        "text.usetex: True\naxes.grid: True\npath.sketch: 3, 100, 2\nlines.linewidth: 9\nfont.size: 30\n"
+        "axes.facecolor: red\nsavefig.bbox: tight\nfigure.constrained_layout.use: True\naxes.unicode_minus: False\n"
+    )
+    code = (
+        "import sys; from pathlib import Path; from ensemble.figures import run_figure, save;"
+        "from tests.ensemble.made_runs import orbit; save(run_figure(orbit()), Path(sys.argv[1]))"
+    )
+    for name, settings in (("plain.svg", tmp_path / "none"), ("user.svg", tmp_path / "matplotlibrc")):
+        subprocess.run(
+            [sys.executable, "-c", code, str(tmp_path / name)],
+            env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path), "MATPLOTLIBRC": str(settings)},
+            check=True,
+        )
+    assert (tmp_path / "user.svg").read_bytes() == (tmp_path / "plain.svg").read_bytes()
+
+
+def test_the_target_of_a_link_is_replaced_and_the_link_stays(tmp_path: Path) -> None:
+    (tmp_path / "elsewhere").mkdir()
+    link, target = tmp_path / "link.svg", tmp_path / "elsewhere" / "figure.svg"
+    link.symlink_to(target)
+    for _ in range(2):
+        save(Figure(), link)
+        assert link.is_symlink()
+        assert target.read_bytes().startswith(b"<?xml")
+    assert [path.name for path in target.parent.iterdir()] == [target.name]
+
+
+def test_a_pipe_is_written_to_and_stays(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe.svg"
+    os.mkfifo(pipe)
+    with subprocess.Popen(["cat", str(pipe)], stdout=subprocess.PIPE) as reader:
+        save(Figure(), pipe)
+        assert reader.communicate()[0].startswith(b"<?xml")
+    assert pipe.is_fifo()
+
+
+def test_a_directory_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "figure.svg").mkdir()
+    with pytest.raises(OSError, match="is a directory"):
+        save(Figure(), tmp_path / "figure.svg")
+    assert list(tmp_path.rglob("*")) == [tmp_path / "figure.svg"]

@@ -15,6 +15,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+import xarray
 
 from ensemble.store.hdf5_export import export_run
 from ensemble.store.run_record import RunSummary, arrays
@@ -42,12 +43,17 @@ while True:
 
 
 def read(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-    """Data sets and attributes of a file by name."""
+    """Variables and attributes of a file by name, as HDF5 has them."""
     with h5py.File(path, "r") as file:
         return (
-            {name: np.asarray(data[()]) for name, data in file.items()},
-            {name: json.loads(text) for name, text in file.attrs.items()},
+            {name: np.asarray(data[()]) for name, data in file.items() if not is_bare_dimension(data)},
+            {name: json.loads(text) for name, text in file.attrs.items() if name != "_NCProperties"},
         )
+
+
+def is_bare_dimension(data: h5py.Dataset) -> bool:
+    """Whether a data set only stands for a dimension without coordinates."""
+    return bytes(data.attrs.get("NAME", b"")).startswith(b"This is a netCDF dimension but not")
 
 
 @pytest.mark.parametrize("run", [shear_run(), failed_run()], ids=["shear", "failed"])
@@ -83,7 +89,7 @@ def test_failed_export_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> N
     run, path = shear_run(), tmp_path / "run.h5"
     export_run(RunSummary.of(run), run, path)
     before = path.read_bytes()
-    unwritable = replace(run, series=run.series | {"gap": np.array([object()])})
+    unwritable = replace(run, series=run.series | {"gap": np.array([object()] * len(run.series["gap"]))})
     with pytest.raises(TypeError):
         export_run(RunSummary.of(run), unwritable, path)
     assert path.read_bytes() == before
@@ -96,19 +102,19 @@ def test_file_is_whole_whenever_its_writer_is_killed(tmp_path: Path) -> None:
     moment = random.Random(5)
     acknowledged, torn = 0, 0
     for _ in range(8):
+        earlier = set(tmp_path.glob(".*"))
         command = [sys.executable, "-c", EXPORT_FOREVER, str(path), str(acknowledged)]
         with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) as writer:
             assert writer.stdout is not None
             first = writer.stdout.readline()
             time.sleep(moment.uniform(0, 0.05))
-            unfinished = path.with_name(f".{writer.pid}.{path.name}")
             deadline = time.monotonic() + 10
-            while not unfinished.exists() and time.monotonic() < deadline:
+            while not set(tmp_path.glob(".*")) - earlier and time.monotonic() < deadline:
                 pass
             writer.kill()
             lines = (first + writer.stdout.read()).split()
         acknowledged = max(map(int, lines))
-        torn += unfinished.exists()
+        torn += bool(set(tmp_path.glob(".*")) - earlier)
         values, attributes = read(path)
         # The last export may be in place although its writer had no time to say so.
         assert attributes["time"] in (acknowledged, acknowledged + 1)
@@ -116,3 +122,18 @@ def test_file_is_whole_whenever_its_writer_is_killed(tmp_path: Path) -> None:
         assert (values["tension"] == attributes["time"]).all()
         assert {entry for entry in tmp_path.iterdir() if not entry.name.startswith(".")} == {path}
     assert torn > 0, "no writer was killed in the middle of a write"
+
+
+def test_xarray_opens_an_export_with_names_coordinates_and_units_and_writes_it_again(tmp_path: Path) -> None:
+    run = shear_run()
+    export_run(RunSummary.of(run), run, tmp_path / "run.h5")
+    with xarray.open_dataset(tmp_path / "run.h5", engine="h5netcdf") as data:
+        assert set(data.coords) == {"time", "frame_time"}
+        assert data["gap"].dims == ("time",)
+        assert data["tangent_angle"].dims == ("frame_time", "vesicle", "point")
+        assert all(variable.attrs.keys() >= {"long_name", "units"} for variable in data.variables.values())
+        np.testing.assert_array_equal(data["tension"].sel(frame_time=3.0), run.frames.tension[3])
+        assert json.loads(data.attrs["outcome"]) == "bound"
+        data.to_netcdf(tmp_path / "again.nc", engine="h5netcdf")
+    with xarray.open_dataset(tmp_path / "again.nc", engine="h5netcdf") as again:
+        np.testing.assert_array_equal(again["gap"], run.series["gap"])
