@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
 import shutil
@@ -17,7 +18,7 @@ import pytest
 from tests import postgresql
 from tests.processor_time import ProcessorTimes
 
-# Before anything imports NumPy: the tests run in several processes, whose threads would fight for the processors.
+# Before anything imports NumPy: the tests run in several processes, whose threads would compete.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 ENSEMBLE = (sys.executable, "-m", "ensemble")
@@ -35,6 +36,13 @@ QUICK_STUDY = (
 def pytest_configure(config: pytest.Config) -> None:
     """Measure what the tests cost."""
     config.pluginmanager.register(ProcessorTimes(config.getoption("durations")))
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Compile the kernels before there are processes that would each compile the same ones."""
+    if session.config.getoption("numprocesses") and not hasattr(session.config, "workerinput"):
+        command = [sys.executable, "-m", "tests.solver.compile_kernels"]
+        subprocess.run(command, cwd=session.config.rootpath, check=True)
 
 
 @dataclass(frozen=True)
@@ -123,14 +131,31 @@ class Finished:
 
 
 @pytest.fixture(scope="session")
+def session_directory(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A directory that all processes of a test session share."""
+    base = tmp_path_factory.getbasetemp()
+    return base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
+
+
+@pytest.fixture(scope="session")
 def finished_study(
-    launcher: Launcher, bisect_command: Callable[[Path], list[str]], tmp_path_factory: pytest.TempPathFactory
+    launcher: Launcher, bisect_command: Callable[[Path], list[str]], session_directory: Path
 ) -> Finished:
-    """The quick study in a store; tests may read it and ask for it again."""
-    store = tmp_path_factory.mktemp("finished") / "store"
-    result = launcher.run(2, bisect_command(store))
-    assert result.returncode == 0, result.stderr
-    return Finished(store, json.loads(result.stdout), result.stderr)
+    """The quick study in a store; tests may read it and ask for it again.
+
+    The first process that needs it traces it; the others wait and read the same store.
+    """
+    store = session_directory / "finished" / "store"
+    printed = store.with_name("printed.json")
+    store.parent.mkdir(exist_ok=True)
+    with store.with_name("lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not printed.exists():
+            result = launcher.run(2, bisect_command(store))
+            assert result.returncode == 0, result.stderr
+            printed.write_text(json.dumps([result.stdout, result.stderr]))
+    stdout, stderr = json.loads(printed.read_text())
+    return Finished(store, json.loads(stdout), stderr)
 
 
 @pytest.fixture(scope="session")

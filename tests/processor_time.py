@@ -1,4 +1,4 @@
-"""What each test costs in processor time, which unlike the clock does not depend on what else the machine does."""
+"""What each test costs in processor time, which depends less than the clock on what else the machine does."""
 
 from __future__ import annotations
 

@@ -1,0 +1,31 @@
+"""Compiles the kernels, which Numba keeps beside their sources for every process that follows."""
+
+from __future__ import annotations
+
+from solver.scene import LARGEST_DENSE, Adhesion, Scene
+from solver.simulation.simulate import simulate
+from tests.solver.scenes import fixed_horizon, uneven_pair, with_contrasts
+from tests.solver.suspensions import suspension
+
+HORIZON = 1e-3
+COUNT = LARGEST_DENSE + 1
+
+
+def scenes_that_use_every_kernel() -> list[Scene]:
+    """Return scenes with few and with many vesicles, of both potentials, with and without a contrast."""
+    pair = uneven_pair(**fixed_horizon(HORIZON))
+    many = suspension(COUNT, **fixed_horizon(HORIZON))
+    cutoff = {"adhesion": Adhesion(hamaker=1.0, distance=0.4, cutoff=1.2)}
+    return [
+        pair,
+        pair.model_copy(update=cutoff),
+        with_contrasts(pair, 2.0, 0.5),
+        many,
+        many.model_copy(update=cutoff),
+        with_contrasts(many, *[2.0] * COUNT),
+    ]
+
+
+if __name__ == "__main__":
+    for scene in scenes_that_use_every_kernel():
+        simulate(scene)
