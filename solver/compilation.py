@@ -1,7 +1,7 @@
 """How the sums over points are compiled.
 
-Their inner loops are plain loops that LLVM turns into SIMD code, which needs ``error_model="numpy"`` (no
-branch for a division by zero).
+Their inner loops are plain loops that LLVM turns into SIMD code.  This needs ``error_model="numpy"``, without
+which every division has a branch for zero.
 """
 
 from __future__ import annotations
@@ -22,7 +22,18 @@ compiled = partial(
 def widest_vectors(typing_context: Any) -> Any:
     """Let LLVM use 512-bit vectors in the function that calls this, where the processor has them.
 
-    By default it keeps to 256 bits on most of them, to spare the clock; sums gain a quarter without.
+    By default LLVM keeps to 256 bits on most processors, because wider ones lower the clock rate.  Sums
+    gain a quarter nevertheless.
+
+    Parameters
+    ----------
+    typing_context : object
+        Given by Numba; a call in compiled code has no arguments.
+
+    Returns
+    -------
+    tuple
+        Signature and code generator, as Numba wants them of an intrinsic.
     """
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:

@@ -1,9 +1,9 @@
-"""Work that several ranks share: which rows of a sum each computes, and how all come to have the whole.
+"""Work that several ranks share: which rows of a sum each one computes, and how all of them get the whole.
 
-Every rank of a group takes the same path through a run.  A row is computed by one rank alone and then known
-to all, and nothing is summed across ranks: so all have the same state to the last bit, and decide alike.
-(Their processors must round alike, which is checked after every step by `require_agreement`.)  With another
-number of ranks a row differs by round-off only, where the rows of a matrix product are other ones.
+Every rank of a group takes the same path through a run.  A row is computed by one rank and then sent to all,
+and nothing is summed across ranks.  So all have the same state to the last bit and decide alike.  This needs
+processors that round alike, which `require_agreement` checks after every step.  With another number of ranks
+a row differs by round-off at most, because a matrix product then has other rows.
 """
 
 from __future__ import annotations
@@ -20,20 +20,31 @@ T = TypeVar("T")
 
 
 class RanksDifferError(RuntimeError):
-    """The ranks of a run no longer take the same path; the job must end, or they would wait for ever."""
+    """The ranks of a run no longer take the same path: the job must end, or they would wait for ever."""
 
 
 class Shares(Protocol):
-    """A division of rows: those of this rank are neighbors."""
+    """A division of rows among ranks, in which those of each rank are consecutive."""
 
     @property
     def own(self) -> slice:
-        """The rows of this rank; perhaps none."""
+        """The rows of this rank; there may be none."""
 
     def gather(self, part: Array, axis: int = 0) -> Array:
-        """All rows, on every rank, from each rank's own, along an axis.
+        """Return all rows, on every rank, from those of each rank.
 
-        Collective.  With more than one rank the result is a new array.
+        Collective.
+
+        Parameters
+        ----------
+        part : (..., own rows, ...)
+        axis : int
+            Of the rows.
+
+        Returns
+        -------
+        (..., rows, ...)
+            A new array if there is more than one rank.
         """
 
 
@@ -42,48 +53,84 @@ class Parallel(Protocol):
 
     @property
     def rank(self) -> int:
-        """Which of them this is, from 0."""
+        """Number of this rank, from 0."""
 
     @property
     def size(self) -> int:
-        """How many there are."""
+        """Number of ranks."""
 
     def divide(self, rows: int, cost: Callable[[], Array] | None = None) -> Shares:
         """Share out rows evenly.
 
-        ``cost`` is asked for the costs, (rows,), alike on all ranks; without it all rows cost the same.
+        Parameters
+        ----------
+        rows : int
+        cost : callable, optional
+            Returns the costs, (rows,), the same on all ranks.  Without it all rows cost the same.
+
+        Returns
+        -------
+        Shares
         """
 
     def agree(self, value: T) -> T:
-        """What the first rank has for this value.
+        """Return the value that the first rank has.
 
         Collective.
+
+        Parameters
+        ----------
+        value : object
+            Of this rank.
+
+        Returns
+        -------
+        object
         """
 
 
 class _Everything:
-    """All of ``rows`` rows on one rank."""
+    """All rows on one rank."""
 
     def __init__(self, rows: int) -> None:
         self.own = slice(0, rows)
 
     def gather(self, part: Array, axis: int = 0) -> Array:
-        """See `Shares`."""
         return part
 
 
 class Serial:
-    """A run on one rank alone."""
+    """A run on a single rank."""
 
     rank = 0
     size = 1
 
     def divide(self, rows: int, cost: Callable[[], Array] | None = None) -> Shares:
-        """See `Parallel`."""
+        """Give all rows to the only rank.
+
+        Parameters
+        ----------
+        rows : int
+        cost : callable, optional
+            Not called.
+
+        Returns
+        -------
+        Shares
+        """
         return _Everything(rows)
 
     def agree(self, value: T) -> T:
-        """See `Parallel`."""
+        """Return the value.
+
+        Parameters
+        ----------
+        value : object
+
+        Returns
+        -------
+        object
+        """
         return value
 
 
@@ -96,7 +143,7 @@ class Ranks:
     Parameters
     ----------
     communicator : mpi4py.MPI.Intracomm
-        Used by this run alone while it lasts.
+        Not to be used for anything else while the run lasts.
     """
 
     def __init__(self, communicator: Any) -> None:
@@ -105,18 +152,37 @@ class Ranks:
         self.size: int = communicator.Get_size()
 
     def divide(self, rows: int, cost: Callable[[], Array] | None = None) -> Shares:
-        """See `Parallel`."""
+        """Share out rows so that each rank has about the same cost, see `Parallel`.
+
+        Parameters
+        ----------
+        rows : int
+        cost : callable, optional
+
+        Returns
+        -------
+        Shares
+        """
         costs = cost() if cost else np.ones(rows)
         return _Division(self._communicator, even_bounds(costs, self.size))
 
     def agree(self, value: T) -> T:
-        """See `Parallel`."""
+        """Return the value that the first rank has, see `Parallel`.
+
+        Parameters
+        ----------
+        value : object
+
+        Returns
+        -------
+        object
+        """
         agreed: T = self._communicator.bcast(value)
         return agreed
 
 
 class _Division:
-    """Rows shared out among the ranks of a communicator; rank k has those from bounds[k] to bounds[k + 1]."""
+    """Rows shared out among the ranks of a communicator: rank k has those from bounds[k] to bounds[k + 1]."""
 
     def __init__(self, communicator: Any, bounds: NDArray[np.int64]) -> None:
         self._communicator = communicator
@@ -126,7 +192,6 @@ class _Division:
         self.own = slice(int(bounds[rank]), int(bounds[rank + 1]))
 
     def gather(self, part: Array, axis: int = 0) -> Array:
-        """See `Shares`."""
         rows = np.ascontiguousarray(part if axis == 0 else np.moveaxis(part, axis, 0))
         whole = np.empty((self._rows, *rows.shape[1:]))
         width = prod(rows.shape[1:])
@@ -135,9 +200,20 @@ class _Division:
 
 
 def even_bounds(cost: Array, size: int) -> NDArray[np.int64]:
-    """Where each of ``size`` shares of rows begins, and the last one ends, (size + 1,).
+    """Return where each share of rows begins, and where the last one ends.
 
-    A row, whose cost is positive, belongs to the share in which the middle of its cost falls.
+    A row belongs to the share in which the middle of its cost falls.
+
+    Parameters
+    ----------
+    cost : (rows,)
+        Positive.
+    size : int
+        Number of shares.
+
+    Returns
+    -------
+    (size + 1,)
     """
     reached = np.cumsum(cost)
     goals = np.arange(size + 1) / size * reached[-1]
@@ -147,9 +223,19 @@ def even_bounds(cost: Array, size: int) -> NDArray[np.int64]:
 
 
 def first_rank_asks(parallel: Parallel, question: Callable[[], bool] | None) -> Callable[[], bool] | None:
-    """The question, asked on the first rank for all of them.
+    """Make a question whose answer is that of the first rank, on all ranks.
 
-    None if the first rank has none.  Collective, and so are the calls of the result.
+    Collective, and so are the calls of the result.
+
+    Parameters
+    ----------
+    parallel : Parallel
+    question : callable or None
+
+    Returns
+    -------
+    callable or None
+        None if the first rank has no question.
     """
     if not parallel.agree(question is not None):
         return None
@@ -157,14 +243,20 @@ def first_rank_asks(parallel: Parallel, question: Callable[[], bool] | None) -> 
 
 
 def require_agreement(parallel: Parallel, value: float) -> None:
-    """Check that all ranks have come to the same number.
+    """Check that all ranks have computed the same number.
 
     Collective.
+
+    Parameters
+    ----------
+    parallel : Parallel
+    value : float
+        Of this rank.
 
     Raises
     ------
     RanksDifferError
-        On a rank that has another number than the first one.
+        On a rank whose number is not that of the first one.
     """
     if (first := parallel.agree(value)) != value:
         raise RanksDifferError(

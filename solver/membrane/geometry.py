@@ -303,7 +303,7 @@ class Geometry:
 
     @property
     def curve_centers(self) -> Array:
-        """Centers of all curves, (2, C)."""
+        """The centers of all curves, (2, C)."""
         return self.membranes.with_images(self.centers, axis=1)
 
     @cached_property

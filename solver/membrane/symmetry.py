@@ -13,7 +13,16 @@ from solver.scene import Scene, Vesicle
 
 
 def has_images(scene: Scene) -> bool:
-    """Whether the scene is a vesicle and its image."""
+    """Return whether a scene consists of a vesicle and its image.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Returns
+    -------
+    bool
+    """
     if len(scene.vesicles) != 2 or (scene.flow is not None and not scene.flow.odd):
         return False
     first, second = scene.vesicles
@@ -24,5 +33,14 @@ def has_images(scene: Scene) -> bool:
 
 
 def independent_vesicles(scene: Scene) -> tuple[Vesicle, ...]:
-    """The vesicles that have to be computed: all, or those that are not images."""
+    """Return the vesicles that have to be computed: all, or those that are not images.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Returns
+    -------
+    tuple of Vesicle
+    """
     return scene.vesicles[:1] if has_images(scene) else scene.vesicles
