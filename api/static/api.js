@@ -1,4 +1,4 @@
-/** Requests to the service.  Addresses are paths such as `/jobs`; errors are `Problem`. */
+/** Requests to the service. Addresses are paths, for example `/jobs`. Errors are thrown as `Problem`. */
 
 import { Problem } from "./problems.js";
 import { askForToken, token } from "./token.js";
@@ -10,13 +10,13 @@ const SECONDS_TO_RECONNECT = 1;
 /**
  * @param {string} path
  * @param {RequestInit} [options]
- * @returns {Promise<Response>} One that is ok.
+ * @returns {Promise<Response>} A response with a status of success.
  */
 async function request(path, options = {}) {
-  const used = token();
+  const sentToken = token();
   const headers = new Headers(options.headers);
-  if (used) {
-    headers.set("Authorization", `Bearer ${used}`);
+  if (sentToken) {
+    headers.set("Authorization", `Bearer ${sentToken}`);
   }
   const response = await fetch(path, { ...options, headers });
   if (response.ok) {
@@ -26,9 +26,11 @@ async function request(path, options = {}) {
   if (problem.status !== UNAUTHORIZED) {
     throw problem;
   }
-  // Another request may have got a new token while this one was under way.
-  if (token() === used) {
-    await askForToken(used ? "The service does not accept this token." : "This service asks for a token.");
+  // Another request may have asked for a new token in the meantime.
+  if (token() === sentToken) {
+    await askForToken(
+      sentToken ? "The service does not accept this token." : "This service requires a token.",
+    );
   }
   return request(path, options);
 }
@@ -54,7 +56,7 @@ export async function getText(path, signal) {
 }
 
 /**
- * Get numbers: little-endian float32.
+ * Get an array of little-endian float32.
  *
  * @param {string} path
  * @param {AbortSignal} signal
@@ -66,7 +68,7 @@ export async function getNumbers(path, signal) {
 }
 
 /**
- * Send a document and get the answer's.
+ * Send a document and get the document of the answer.
  *
  * @param {string} path
  * @param {unknown} document
@@ -92,7 +94,7 @@ export async function remove(path) {
 }
 
 /**
- * All items of a collection.
+ * Get all items of a collection, page by page.
  *
  * @param {string} path
  * @param {AbortSignal} signal
@@ -109,21 +111,21 @@ export async function getAll(path, signal) {
 }
 
 /**
- * A document, now and each time that it has changed; also across times in which the service is away.
+ * Yield a document in its present state and after each change. Continue while the service restarts.
  *
- * The browser keeps the document with its ETag, so asking again for one that is the same costs next to nothing.
+ * The browser caches the document with its ETag, so requests for an unchanged document cost little.
  *
  * @param {string} path
- * @param {number} seconds - Between two questions.
+ * @param {number} seconds - Between two requests.
  * @param {AbortSignal} signal
  * @returns {AsyncGenerator<any>}
  */
 export async function* changesOf(path, seconds, signal) {
-  let seen = null;
+  let shown = null;
   while (!signal.aborted) {
-    const text = await getText(path, signal).catch(unlessAway(signal));
-    if (text !== undefined && text !== seen) {
-      seen = text;
+    const text = await getText(path, signal).catch(ignoreUnreachable(signal));
+    if (text !== undefined && text !== shown) {
+      shown = text;
       yield JSON.parse(text);
     }
     await pause(seconds, signal);
@@ -131,12 +133,12 @@ export async function* changesOf(path, seconds, signal) {
 }
 
 /**
- * The documents that the service sends as server-sent events, also across interrupted connections.
+ * Yield the documents of server-sent events. Reconnect when the connection is interrupted.
  *
- * `EventSource` would not do: it cannot send a token.
+ * `EventSource` is not used because it cannot send a token.
  *
  * @param {string} path
- * @param {(document: any) => boolean} isLast - Whether nothing comes after a document.
+ * @param {(document: any) => boolean} isLast - Whether a document is the last one.
  * @param {AbortSignal} signal
  * @returns {AsyncGenerator<any>}
  */
@@ -152,19 +154,19 @@ export async function* eventsOf(path, isLast, signal) {
         }
       }
     } catch (error) {
-      unlessAway(signal)(error);
+      ignoreUnreachable(signal)(error);
     }
     await pause(SECONDS_TO_RECONNECT, signal);
   }
 }
 
 /**
- * A handler that passes over the error by which `fetch` says that the service cannot be reached.
+ * Return a handler that ignores the error of `fetch` for a service that cannot be reached.
  *
  * @param {AbortSignal} signal
  * @returns {(error: unknown) => undefined}
  */
-function unlessAway(signal) {
+function ignoreUnreachable(signal) {
   return (error) => {
     if (signal.aborted || !(error instanceof TypeError)) {
       throw error;

@@ -1,4 +1,4 @@
-/** A boundary as it is being traced: its phase diagram, its points, its runs, and values read off it. */
+/** A boundary: its phase diagram, its points, its runs, and values read from it. */
 
 import { changesOf, get } from "./api.js";
 import { phaseDiagram } from "./diagram.js";
@@ -16,29 +16,29 @@ import { describe, quantity, valueAt } from "./symbols.js";
  * @typedef {import("./diagram.js").Mark} Mark
  */
 
-const SECONDS_BETWEEN_LOOKS = 0.5;
+const SECONDS_BETWEEN_REQUESTS = 0.5;
 const SEARCHING = "searching";
 const CONVERGED = "converged";
 
 /**
- * Show a boundary, and go on showing how it changes.
+ * Show a boundary, and update the view when it changes.
  *
  * @param {HTMLElement} place
  * @param {string} key
  * @param {AbortSignal} signal
- * @returns {Promise<void>} Done when the place is left.
+ * @returns {Promise<void>} Resolved when another view is shown.
  */
 export async function followBoundary(place, key, signal) {
   const marks = new Marks(signal);
   let view = null;
-  for await (const boundary of changesOf(`/boundaries/${key}`, SECONDS_BETWEEN_LOOKS, signal)) {
+  for await (const boundary of changesOf(`/boundaries/${key}`, SECONDS_BETWEEN_REQUESTS, signal)) {
     const runs = await marks.of(boundary);
     view ??= new BoundaryView(place, signal);
     view.show(boundary, runs);
   }
 }
 
-/** The runs behind a boundary; what is known of a run never changes, so each is asked for once. */
+/** The runs of a boundary. A run never changes, so each is requested once. */
 class Marks {
   /** @type {Map<string, Promise<any>>} */
   #summaries = new Map();
@@ -66,9 +66,9 @@ class Marks {
 
   /** @param {string} key */
   #summary(key) {
-    const known = this.#summaries.get(key) ?? get(`/runs/${key}`, this.signal);
-    this.#summaries.set(key, known);
-    return known;
+    const summary = this.#summaries.get(key) ?? get(`/runs/${key}`, this.signal);
+    this.#summaries.set(key, summary);
+    return summary;
   }
 }
 
@@ -116,7 +116,7 @@ class BoundaryView {
     void this.plot.draw(() => phaseDiagram(boundary, marks));
     this.points.replaceChildren(pointsTable(boundary));
     this.#showRuns(boundary, marks);
-    this.#offerReading(boundary);
+    this.#addReadingForm(boundary);
   }
 
   /**
@@ -139,7 +139,7 @@ class BoundaryView {
   }
 
   /** @param {Boundary} boundary */
-  #offerReading(boundary) {
+  #addReadingForm(boundary) {
     const converged = boundary.points.filter((point) => point.status === CONVERGED);
     if (this.reading.hasChildNodes() || converged.length < 2) {
       return;
@@ -154,7 +154,7 @@ function titleOf({ study: { scene, sweep, search } }) {
 }
 
 /**
- * What the diagram shows, in words.
+ * Describe the diagram in words.
  *
  * @param {Boundary} boundary
  * @param {Mark[]} marks
@@ -201,7 +201,7 @@ function stateOfAll(points) {
 }
 
 /**
- * A form that reads the critical value off at a value of the swept parameter.
+ * Make a form that reads a critical value at a value of the swept parameter.
  *
  * @param {Boundary} boundary
  * @param {AbortSignal} signal
@@ -234,7 +234,7 @@ function readingForm(boundary, signal) {
   }
 
   return [
-    element("h2", {}, "Read off a value"),
+    element("h2", {}, "Read a critical value"),
     element(
       "form",
       { class: "inline", onsubmit: read },

@@ -1,4 +1,4 @@
-/** Colors of tensions: Matplotlib's plasma, without the end that would vanish on the page. */
+/** Colors of tensions: Matplotlib's plasma without the end that is hardly visible on the page. */
 
 const PLASMA = [
   [13, 8, 135],
@@ -23,7 +23,7 @@ const ON_LIGHT = [0, 0.86];
 const ON_DARK = [0.22, 1];
 
 /**
- * @param {number} share - From 0 to 1; what lies beyond gets the color of the end.
+ * @param {number} share - From 0 to 1; values outside get the color of the nearer end.
  * @param {boolean} isDark
  * @returns {string}
  */
@@ -38,10 +38,10 @@ export function tensionColor(share, isDark) {
 }
 
 /**
- * The range of colors: all tensions but those of the first frame, if there are others.
+ * Return the range of the color map: the tensions of all frames except the first, if there are several.
  *
- * An ellipse that has not relaxed yet has tensions several times larger, which would leave a single color to the
- * rest of the run.  The range is never so narrow that it would show rounding errors.
+ * The initial ellipses have tensions several times larger, which would leave one color for the rest of the run. The
+ * range is never so narrow that rounding errors become visible.
  *
  * @param {import("./frames.js").State[]} states
  * @returns {[number, number]}

@@ -1,18 +1,18 @@
 /**
  * The line across the plots at the time that the player shows.
  *
- * An element of its own: Plotly would lay all plots out anew to move a line, which is too slow to play by.
+ * It is an element on top of the plots: moving a line of Plotly's lays out all plots again, which is too slow.
  */
 
 import { element } from "./dom.js";
 
-const ROUNDING = 1e-6; // times of frames come in single precision, those of the plots in double
+const ROUNDING = 1e-6; // times of frames are in single precision, those of the plots in double
 
 /** @typedef {{l: number, r: number, t: number, b: number}} Margin - Pixels around the plots' axes. */
 
 export class Cursor {
   /**
-   * @param {HTMLElement} plots - Where Plotly draws, all plots with one axis of time.
+   * @param {HTMLElement} plots - The element of the plots, which share one axis of time.
    * @param {Margin} margin
    */
   constructor(plots, margin) {
@@ -24,7 +24,7 @@ export class Cursor {
   }
 
   /**
-   * Stand at a time, as far as the plots have been drawn and show it.
+   * Move the line to a time. It is hidden while the plots do not show this time.
    *
    * @param {number} time
    */

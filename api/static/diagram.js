@@ -1,7 +1,7 @@
 /**
- * The phase diagram of a study: every run, the brackets of the boundary and a straight line through it.
+ * The phase diagram of a study: all runs, the brackets of the boundary and a straight line through them.
  *
- * A pure function of what the service says; `Plot` draws it.
+ * A pure function from documents of the service to a figure, which `Plot` draws.
  */
 
 import { number } from "./format.js";
@@ -37,7 +37,7 @@ import { color } from "./theme.js";
  * @property {string} outcome
  */
 
-const LAST_IN_LEGEND = 2000; // Plotly gives traces 1000
+const LAST_IN_LEGEND = 2000; // the default of Plotly is 1000
 
 /**
  * @param {Boundary} boundary
@@ -88,7 +88,7 @@ function at(point, boundary) {
 }
 
 /**
- * The whole sweep from the start, so that the axis rests while points come in.
+ * The range of the whole sweep, so that the axis does not move when points are added.
  *
  * @param {Boundary} boundary
  * @param {Mark[]} marks
@@ -186,7 +186,7 @@ function fitLine(boundary, points, x, y) {
       type: "scatter",
       mode: "lines",
       name: line,
-      legendrank: LAST_IN_LEGEND, // and drawn first, below the runs
+      legendrank: LAST_IN_LEGEND, // it is still drawn first, below the runs
       x: ends,
       y: ends.map((end) => fit.intercept + fit.slope * end),
       line: { color: color("muted"), width: 1.3, dash: "6px,4px" },

@@ -1,12 +1,12 @@
-/** Building elements. */
+/** Helpers that make elements. */
 
 /** @typedef {Node | string | null | undefined | Child[]} Child */
 
 /**
  * Make an element.
  *
- * Names of attributes that begin with `on` take listeners; `true` sets an attribute without a value, and
- * `false`, null and undefined leave it out.
+ * Attributes whose names begin with `on` are listeners. `true` sets an attribute without a value; `false`, null
+ * and undefined omit it.
  *
  * @template {keyof HTMLElementTagNameMap} Tag
  * @param {Tag} tag
@@ -44,9 +44,9 @@ function append(parent, children) {
 }
 
 /**
- * A table; each row is a list of cells.
+ * Make a table. Each row is a list of cells.
  *
- * The names of the columns are repeated with every cell, for screens too narrow to show a row as one.
+ * Each cell also has the name of its column, which narrow screens show beside it.
  *
  * @param {string} caption
  * @param {string[]} columns
@@ -77,7 +77,7 @@ export function tableRow(columns, cells) {
 }
 
 /**
- * A list of names and what belongs to them; entries without a value are left out.
+ * Make a list of names and values. Entries without a value are omitted.
  *
  * @param {[Child, Child][]} entries
  * @returns {HTMLDListElement}

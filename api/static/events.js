@@ -1,4 +1,4 @@
-/** The text of server-sent events. */
+/** Parser for server-sent events. */
 
 /**
  * Read the data of each event of a stream.
@@ -25,13 +25,13 @@ export async function* readEvents(stream) {
       }
     }
   } finally {
-    await reader.cancel().catch(() => undefined); // a stream that was aborted has nothing left to cancel
+    await reader.cancel().catch(() => undefined); // an aborted stream cannot be canceled
   }
 }
 
 /**
- * @param {string} block - The lines of one event; comments, which keep a connection open, have no data.
- * @returns {string}
+ * @param {string} block - The lines of one event, or of a comment that keeps the connection open.
+ * @returns {string} Empty for a comment.
  */
 function dataOf(block) {
   return block

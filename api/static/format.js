@@ -1,9 +1,9 @@
-/** Numbers, times and names as people read them. */
+/** Numbers, times and names as text. */
 
-/** @typedef {number | string | null | undefined} Maybe - The service writes numbers that are not finite as text. */
+/** @typedef {number | string | null | undefined} Maybe - Numbers that are not finite come as text. */
 
 /**
- * A number with this many significant digits at most.
+ * Write a number with at most this many significant digits.
  *
  * @param {Maybe} value
  * @param {number} [digits]
@@ -38,7 +38,7 @@ function withMinus(text) {
 }
 
 /**
- * The ends of a bracket, with as many digits as tell them apart.
+ * Write a bracket with enough digits to distinguish its ends.
  *
  * @param {[number | null, number | null]} bracket
  * @returns {string}
@@ -55,7 +55,7 @@ export function interval([low, high]) {
 }
 
 /**
- * A length of time.
+ * Write a duration.
  *
  * @param {number} seconds
  * @returns {string}
@@ -81,7 +81,7 @@ export function dateAndTime(moment) {
 }
 
 /**
- * The name of a preset or a study as words.
+ * Write the name of a preset or a study as words.
  *
  * @param {string} name
  * @returns {string}

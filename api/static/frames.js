@@ -1,4 +1,4 @@
-/** The recorded states of a run, and the states between them. */
+/** The recorded states of a run, and interpolated states between them. */
 
 import { getNumbers } from "./api.js";
 
@@ -14,9 +14,9 @@ import { getNumbers } from "./api.js";
  */
 
 const ROWS = /** @type {const} */ (["x", "y", "tension"]);
-const NUMBERS_AT_ONCE = 500_000; // in an answer: half of what the service gives
+const NUMBERS_AT_ONCE = 500_000; // in one answer; half of the default limit of the service
 
-/** Recorded states in the order of time, without those that are not finite, as a failed run may end with. */
+/** Recorded states in order of time, without states that are not finite, which a failed run may end with. */
 export class Frames {
   /** @type {State[]} */
   states = [];
@@ -30,7 +30,7 @@ export class Frames {
     this.points = points;
   }
 
-  /** Numbers in a frame. */
+  /** Number of values in a frame. */
   get size() {
     return 1 + 3 * this.vesicles * this.points;
   }
@@ -46,9 +46,9 @@ export class Frames {
   }
 
   /**
-   * Ask for all frames of a run, some at a time.
+   * Get all frames of a run in several requests.
    *
-   * @param {any} run - Its summary.
+   * @param {any} run - The summary of the run.
    * @param {AbortSignal} signal
    * @param {number} [numbersAtOnce]
    */
@@ -80,7 +80,7 @@ export class Frames {
   }
 
   /**
-   * The state at a time: a recorded one, or a cubic Hermite interpolation between two.
+   * Return the state at a time: a recorded one, or a cubic Hermite interpolation between two.
    *
    * @param {number} time
    * @returns {State}
@@ -126,9 +126,10 @@ function stateOf(frame, vesicles, points) {
 }
 
 /**
- * Weights of four values in the cubic between the two inner ones, with the slopes of central differences.
+ * Return the weights of four values in the cubic Hermite interpolation between the two inner ones.
  *
- * Where there is no outer value, the inner one stands in for it, and the slope there is one-sided.
+ * Slopes are central differences. At the ends of a run the inner value replaces the missing outer one, which makes
+ * the slope one-sided.
  *
  * @param {number[]} times
  * @param {number} time

@@ -1,4 +1,4 @@
-/** The diagnostics of a run against time, one below the other. */
+/** Plots of the diagnostics of a run against time, one below the other. */
 
 import { axis } from "./plot.js";
 import { color } from "./theme.js";
@@ -16,12 +16,12 @@ import { color } from "./theme.js";
  * @property {string} title
  * @property {Curve[]} curves
  * @property {(value: number) => number} [convert]
- * @property {(values: (number | null)[]) => object} [ticks] - Options of the axis, from the series as it is stored.
+ * @property {(values: (number | null)[]) => object} [ticks] - Options of the axis, computed from the stored series.
  */
 
 const ANGLE_STEPS = [1, 2, 5, 10, 15, 30, 45, 90, 180, 360, 720]; // degrees between ticks
 const MOST_TICKS = 5;
-const LEAST_ANGLE_RANGE = 2; // degrees: what turns less than that is drawn as at rest
+const LEAST_ANGLE_RANGE = 2; // degrees, so that rounding errors of a steady angle do not fill the plot
 
 /** @param {number} radians */
 function degrees(radians) {
@@ -44,7 +44,7 @@ function angleTicks(angles) {
 
 const ANGLE = { convert: degrees, ticks: angleTicks };
 
-/** Left out are curves, and panels, of which a run has no series. @type {Panel[]} */
+/** Curves and panels for which a run has no series are omitted. @type {Panel[]} */
 const PANELS = [
   { title: "gap", curves: [{ series: "gap", name: "gap", color: "ink" }] },
   {
@@ -73,10 +73,11 @@ const PANELS = [
     ],
   },
 ];
-/** Pixels around the axes, whatever their labels. */
+
+/** Pixels around the axes, independent of their labels. */
 export const MARGIN = { l: 56, r: 12, t: 22, b: 44 };
 const PANEL_HEIGHT = 132; // pixels
-const GAP = 0.34; // between panels, as a share of one
+const GAP = 0.34; // between panels, as a fraction of the height of one
 
 /**
  * @param {Series} series
@@ -117,7 +118,7 @@ export function histories(series) {
 }
 
 /**
- * Plotly counts axes `y`, `y2`, `y3`.
+ * Return the name of an axis; Plotly numbers them `y`, `y2`, `y3`.
  *
  * @param {string} name
  * @param {number} index
@@ -144,7 +145,7 @@ function heading({ title }, top) {
 }
 
 /**
- * The names of a panel's curves, at the end of the line of its title.
+ * The names of a panel's curves, to the right of its title.
  *
  * @param {number} top
  */

@@ -1,4 +1,4 @@
-/** An input for a field of a document, as the kind of its value asks for. */
+/** Inputs for the fields of a document, according to the types of their values. */
 
 import { element } from "./dom.js";
 import { isSame } from "./fields.js";
@@ -21,7 +21,7 @@ export class FieldInput {
     );
   }
 
-  /** What is written in it, as JSON data; text that is no JSON is sent as it is and refused by name. */
+  /** The value as JSON data. Text that is not JSON is sent unchanged, and the service names the invalid field. */
   get value() {
     if (this.input.type === "checkbox") {
       return this.input.checked;
@@ -43,7 +43,7 @@ export class FieldInput {
   }
 }
 
-/** A place for changes of any field, also of one that the document leaves out: `path = value`, one a line. */
+/** An input for changes of any field, one per line: `path = value`. The document may lack the field. */
 export class FurtherChanges {
   constructor() {
     this.input = element("textarea", {
@@ -56,7 +56,7 @@ export class FurtherChanges {
     this.element = element(
       "div",
       { class: "field further" },
-      element("label", { for: "further" }, "any other change: path = value, one a line"),
+      element("label", { for: "further" }, "any other change: path = value, one per line"),
       this.input,
     );
   }
@@ -72,10 +72,10 @@ export class FurtherChanges {
 }
 
 /**
- * JSON data; text that is no JSON stands for itself.
+ * Parse JSON. Text that is not JSON is returned unchanged.
  *
  * @param {string} text
- * @param {boolean} [isList] - Whether the text is what stands between the brackets of a list.
+ * @param {boolean} [isList] - Whether the text is the inside of a list, without brackets.
  * @returns {unknown}
  */
 function parsed(text, isList = false) {

@@ -1,4 +1,4 @@
-/** Parts of the page that show where a job stands. */
+/** Elements that show the state of a job. */
 
 import { remove } from "./api.js";
 import { element } from "./dom.js";
@@ -9,7 +9,7 @@ import { alertAbout } from "./problems.js";
  * @property {string} id
  * @property {"study" | "scene"} kind
  * @property {string} name
- * @property {string} key - Of the boundary or the run that comes of it.
+ * @property {string} key - Key of the resulting boundary or run.
  * @property {number} ranks
  * @property {"accepted" | "running" | "succeeded" | "failed" | "dismissed"} status
  * @property {number} progress - Percent.
@@ -38,7 +38,7 @@ export function progressOf({ progress }) {
 }
 
 /**
- * A link to what the job makes: the diagram of a study is there while it is traced, a run when it is finished.
+ * Make a link to the result. The diagram of a study exists while it is traced, a run when it has finished.
  *
  * @param {Job} job
  */

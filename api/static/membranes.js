@@ -10,17 +10,17 @@ import { color, isDark } from "./theme.js";
  * @typedef {import("./frames.js").Membrane} Membrane
  */
 
-const THICKEST_MEMBRANE = 4.5; // pixels, as all that follow
+const THICKEST_MEMBRANE = 4.5; // pixels, like the following lengths
 const THINNEST_MEMBRANE = 1.2;
 const ARROWS_APART = 56;
 const LONGEST_ARROW = 34;
 const MARGIN = 28;
 const FOOT = 48; // below the drawing, for the color bar and the scale
-const MEMBRANE_THICKNESS = 0.1; // of the unit of length, within these bounds
-const SHADES = 64; // of the color map that are told apart
+const MEMBRANE_THICKNESS = 0.1; // in units of length, within these bounds
+const SHADES = 64; // different colors of the color map
 const BAR = { width: 180, height: 8 };
 
-/** A view that moves with the mean of the vesicles' centers, at one scale for the whole run. */
+/** A canvas that follows the mean of the vesicles' centers, with one scale for the whole run. */
 export class MembraneCanvas {
   /**
    * @param {HTMLCanvasElement} canvas
@@ -36,7 +36,7 @@ export class MembraneCanvas {
     this.style = pageStyle();
   }
 
-  /** Take over the page's colors as they are now. */
+  /** Use the present colors of the page. */
   takeColors() {
     this.style = pageStyle();
   }
@@ -63,7 +63,7 @@ export class MembraneCanvas {
     this.#drawScale(height, scale);
   }
 
-  /** Make the canvas as fine as the screen, and measure in its pixels. */
+  /** Give the canvas the resolution of the screen, with coordinates in pixels of the page. */
   #fit() {
     const { clientWidth: width, clientHeight: height } = this.canvas;
     const ratio = window.devicePixelRatio;
@@ -79,7 +79,7 @@ export class MembraneCanvas {
   /** @param {Membrane[]} outlines - In pixels. */
   #fill(outlines) {
     const { context } = this;
-    context.fillStyle = this.style.surface; // the arrows are those of the fluid around
+    context.fillStyle = this.style.surface; // hides the arrows of the imposed flow inside
     for (const { x, y } of outlines) {
       context.beginPath();
       x.forEach((value, point) => context.lineTo(value, y[point]));
@@ -88,9 +88,9 @@ export class MembraneCanvas {
   }
 
   /**
-   * One short piece for each point, between the middles of its neighbors, bent at the point.
+   * Draw a quadratic curve around each point, between the midpoints to its neighbors.
    *
-   * Pieces of one color are drawn together: with many vesicles that decides how smoothly they move.
+   * Curves of one color are drawn together, which is much faster if there are many vesicles.
    *
    * @param {Membrane[]} outlines - In pixels.
    * @param {number} lineWidth - Thin where vesicles are many and small.
@@ -119,7 +119,7 @@ export class MembraneCanvas {
   }
 
   /**
-   * Arrows of the flow relative to the moving middle; the longest is where the flow is fastest in view.
+   * Draw arrows of the flow relative to the center of the view, scaled to the fastest flow in view.
    *
    * @param {number} width
    * @param {number} height
@@ -245,7 +245,7 @@ function meanCenter({ membranes }) {
 }
 
 /**
- * How far membranes reach from their mean center, over the whole run.
+ * Return the largest distance of the membranes from their mean center, over the whole run.
  *
  * @param {State[]} states
  */

@@ -1,4 +1,4 @@
-/** The mark of each outcome; color and shape each tell it apart from every other. */
+/** The mark of each outcome. Each has its own color and its own shape. */
 
 import { element } from "./dom.js";
 
@@ -22,7 +22,7 @@ export const MARKS = {
 };
 
 /**
- * An outcome with its mark.
+ * Make a label of an outcome with its mark.
  *
  * @param {string} outcome
  * @returns {HTMLElement}

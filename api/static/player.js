@@ -1,4 +1,4 @@
-/** Plays a run: a canvas, and controls for mouse, finger and keyboard. */
+/** Plays a run: a canvas, and controls for mouse, touch and keyboard. */
 
 import { element } from "./dom.js";
 import { number } from "./format.js";
@@ -7,12 +7,12 @@ import { THEME_CHANGED } from "./theme.js";
 
 /** @typedef {import("./frames.js").Frames} Frames */
 
-const SPEEDS = [1, 2, 5, 10, 20, 50]; // units of time a second
-const USUAL_SECONDS = 20; // that a run should take to play
+const SPEEDS = [1, 2, 5, 10, 20, 50]; // units of time per second
+const USUAL_SECONDS = 20; // for playing a whole run at the initial speed
 const TIME_CHANGED = "timechanged";
 const RESTED = "rested";
 
-/** Dispatches `timechanged` when it shows another time, and `rested` when it stays at one. */
+/** A player. It dispatches `timechanged` when it shows another time, and `rested` when it stops at one. */
 export class Player extends EventTarget {
   /** @type {number | null} */
   #lastTick = null;
@@ -20,7 +20,7 @@ export class Player extends EventTarget {
   /**
    * @param {Frames} frames
    * @param {import("./flow.js").ImposedFlow | null} flow
-   * @param {AbortSignal} signal - Stops it.
+   * @param {AbortSignal} signal - Stops the player when it is aborted.
    */
   constructor(frames, flow, signal) {
     super();
@@ -71,7 +71,7 @@ export class Player extends EventTarget {
   #controls() {
     const speeds = element(
       "select",
-      { "aria-label": "Units of time a second", onchange: () => (this.speed = Number(speeds.value)) },
+      { "aria-label": "Units of time per second", onchange: () => (this.speed = Number(speeds.value)) },
       ...SPEEDS.map((speed) =>
         element("option", { value: speed, selected: speed === this.speed }, `${speed} / s`),
       ),
@@ -89,7 +89,7 @@ export class Player extends EventTarget {
   }
 
   /**
-   * Call a function with the time, now and whenever it changes.
+   * Call a function with the time, now and after each change.
    *
    * @param {(time: number) => void} listener
    */
@@ -99,7 +99,7 @@ export class Player extends EventTarget {
   }
 
   /**
-   * Call a function with the time whenever it is one to stay at.
+   * Call a function with the time whenever the player stops.
    *
    * @param {(time: number) => void} listener
    */
@@ -147,9 +147,9 @@ export class Player extends EventTarget {
   }
 
   /**
-   * Show the recorded frame this many frames away.
+   * Show another recorded frame.
    *
-   * @param {number} frames
+   * @param {number} frames - How many frames later.
    */
   step(frames) {
     const { states } = this.frames;
@@ -207,7 +207,7 @@ export class Player extends EventTarget {
   }
 
   #draw() {
-    // Before it is on the page a canvas has no size, and the observer draws it as soon as it has.
+    // A canvas that is not on the page yet has no size. The observer draws it when it gets one.
     if (this.canvas.clientWidth > 0) {
       this.membranes.draw(this.frames.at(this.time));
     }

@@ -1,4 +1,4 @@
-/** A plot that keeps to the page's colors and width.  Plotly itself is loaded when the first one is drawn. */
+/** Plots in the colors and the width of the page. Plotly is loaded when the first plot is drawn. */
 
 import { THEME_CHANGED, color } from "./theme.js";
 
@@ -24,14 +24,14 @@ async function loadPlotly() {
   return (await import("./vendor/plotly.js")).default;
 }
 
-/** A place on the page where figures are drawn, one replacing the other. */
+/** An element in which figures are drawn. Each figure replaces the one before. */
 export class Plot {
   /** @type {(() => Figure) | null} */
   #figure = null;
 
   /**
    * @param {HTMLElement} place
-   * @param {AbortSignal} signal - Frees what the plot holds.
+   * @param {AbortSignal} signal - Removes the plot when it is aborted.
    */
   constructor(place, signal) {
     this.place = place;
@@ -54,9 +54,9 @@ export class Plot {
   }
 
   /**
-   * Listen to an event of Plotly.
+   * Listen for an event of Plotly.
    *
-   * @param {string} name - Such as `plotly_click`.
+   * @param {string} name - For example `plotly_click`.
    * @param {(event: any) => void} listener
    */
   on(name, listener) {
@@ -87,8 +87,8 @@ function pageLayout() {
     font: { family: window.getComputedStyle(document.body).fontFamily, size: 13, color: color("ink") },
     hoverlabel: { bgcolor: color("surface"), bordercolor: color("faint"), font: { color: color("ink") } },
     modebar: { bgcolor: "rgba(0,0,0,0)", color: color("faint"), activecolor: color("muted") },
-    uirevision: "kept", // what somebody zoomed to stays when the figure is drawn anew
-    dragmode: false, // a finger that drags scrolls the page
+    uirevision: "kept", // redrawing keeps the zoom
+    dragmode: false, // so that dragging on a touch screen scrolls the page
   };
 }
 

@@ -1,8 +1,8 @@
-/** What went wrong, as people are told. */
+/** Errors, and how the page shows them. */
 
 import { element } from "./dom.js";
 
-/** An answer of the service that says what is wrong with a request (RFC 9457). */
+/** An error that the service answered with (RFC 9457). */
 export class Problem extends Error {
   /**
    * @param {number} status
@@ -15,7 +15,7 @@ export class Problem extends Error {
   }
 
   /**
-   * @param {Response} response - One that is not ok.
+   * @param {Response} response - A response with a status of failure.
    * @returns {Promise<Problem>}
    */
   static async of(response) {
@@ -26,7 +26,7 @@ export class Problem extends Error {
 }
 
 /**
- * A message about an error.
+ * Make an element that shows an error.
  *
  * @param {unknown} error
  * @returns {HTMLElement}

@@ -1,8 +1,8 @@
 /**
- * Permanent links: what is shown is what stands behind the `#` of the address, a path and a query.
+ * Permanent links: the part of the address after `#`, a path and a query, selects the view.
  *
- * A view gets a signal that is aborted when the page is left for another one.  Everything that a view keeps
- * going (requests, timers, listeners, plots) ends by that signal.
+ * A view gets a signal that is aborted when another view replaces it. Everything that the view started (requests,
+ * timers, listeners, plots) ends with this signal.
  */
 
 import { element } from "./dom.js";
@@ -10,18 +10,18 @@ import { alertAbout } from "./problems.js";
 
 /**
  * @typedef {object} Place
- * @property {HTMLElement} content - What the view fills.
+ * @property {HTMLElement} content - The element that the view fills.
  * @property {Record<string, string>} parameters - Named groups of the route's path.
  * @property {URLSearchParams} query
- * @property {AbortSignal} signal - Aborted when this place is left.
+ * @property {AbortSignal} signal - Aborted when another view is shown.
  *
  * @typedef {object} Route
  * @property {RegExp} path
- * @property {string} section - Which link of the navigation is current.
+ * @property {string} section - The link of the navigation that is marked as current.
  * @property {(place: Place) => Promise<void>} show
  */
 
-/** Where the address points. */
+/** Path and query of the address. */
 function location() {
   const [path, query = ""] = (window.location.hash.slice(1) || "/").split("?", 2);
   return { path, query: new URLSearchParams(query) };
@@ -46,7 +46,7 @@ export function startRouter(routes) {
     document.title = "Vesicle ensemble";
     content.replaceChildren();
     if (!route) {
-      content.replaceChildren(element("h1", {}, "There is nothing here"), element("p", {}, path));
+      content.replaceChildren(element("h1", {}, "Page not found"), element("p", {}, path));
       return;
     }
     try {
@@ -64,7 +64,7 @@ export function startRouter(routes) {
     window.scrollTo(0, 0);
   });
   document.querySelector("[data-skip]")?.addEventListener("click", (event) => {
-    event.preventDefault(); // its hash would be taken for a place
+    event.preventDefault(); // its hash is not a path of a view
     content.focus();
   });
   void show();
@@ -82,7 +82,7 @@ function markCurrent(section) {
 }
 
 /**
- * Put a value into the query of the address, without going anywhere.
+ * Put a value into the query of the address without changing the view.
  *
  * @param {string} name
  * @param {string} value

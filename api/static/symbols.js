@@ -1,4 +1,4 @@
-/** Names and symbols, as the field writes them, of a scene's parameters. */
+/** Established names and symbols of a scene's parameters. */
 
 import { getAll } from "./api.js";
 import { number } from "./format.js";
@@ -20,7 +20,7 @@ const BY_PATH = {
   "adhesion.cutoff": { name: "cutoff", symbol: "cutoff" },
 };
 
-const MOST_NUMBERS = 3; // that are listed
+const MOST_NUMBERS = 3; // that are listed; of more, only the range
 
 const OF_THE_FLOW = "flow.";
 
@@ -45,7 +45,7 @@ export async function loadFlows(signal) {
 }
 
 /**
- * The quantity at a dotted path of a scene; a path without an established symbol stands for itself.
+ * Return the quantity at a dotted path of a scene. A path without an established symbol is its own name.
  *
  * @param {string} path
  * @param {any} scene
@@ -59,10 +59,10 @@ export function quantity(path, scene) {
 }
 
 /**
- * One line on a scene: its vesicles, its flow, and its parameters as far as it has them.
+ * Describe a scene in one line: its vesicles, its flow and its parameters.
  *
  * @param {any} scene
- * @param {string[]} [without] - Dotted paths to leave out, for instance because they are the axes.
+ * @param {string[]} [without] - Dotted paths to omit, for example those of the axes.
  * @returns {string}
  */
 export function describe(scene, without = []) {
@@ -94,7 +94,7 @@ export function describe(scene, without = []) {
 }
 
 /**
- * Each of a few numbers, the ends of many.
+ * List a few numbers; of many, write the range.
  *
  * @param {number[]} values - Ascending.
  */
@@ -105,7 +105,7 @@ function listed(values) {
 }
 
 /**
- * The number at a dotted path of a document; where the path leads through a list, that of its first element.
+ * Return the value at a dotted path of a document. In a list, the path continues in the first element.
  *
  * @param {any} document
  * @param {string} path

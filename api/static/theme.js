@@ -1,12 +1,12 @@
-/** Light and dark: as the system has it unless somebody chooses otherwise. */
+/** Light and dark colors: those of the system unless the user chooses others. */
 
 const KEY = "theme";
 const system = window.matchMedia("(prefers-color-scheme: dark)");
 
-/** Dispatched on `window` when the colors have changed. */
+/** Event of `window` after the colors have changed. */
 export const THEME_CHANGED = "themechanged";
 
-/** Follow the choice of colors in the masthead. */
+/** Apply the choice of colors in the masthead, now and when it changes. */
 export function startTheme() {
   const choice = /** @type {HTMLSelectElement} */ (document.getElementById("theme"));
   choice.value = window.localStorage.getItem(KEY) ?? "auto";
@@ -35,13 +35,13 @@ export function isDark() {
 }
 
 /**
- * The present value of a color of `theme.css`, for what is drawn without style sheets.
+ * Return the present value of a color of `theme.css`, for drawings that style sheets do not reach.
  *
- * @param {string} name - Such as `ink`.
+ * @param {string} name - For example `ink`.
  * @returns {string}
  */
 export function color(name) {
-  // The custom property itself still holds both colors; the element's own color is the one that applies.
+  // The custom property holds both the light and the dark color; a computed color is one of them.
   const probe = document.createElement("span");
   probe.style.color = `var(--${name})`;
   document.body.append(probe);

@@ -11,7 +11,7 @@ export function token() {
 }
 
 /**
- * Ask for a token; requests that are refused meanwhile wait for the same answer.
+ * Ask for a token. Requests that are refused in the meantime wait for the same dialog.
  *
  * @param {string} reason
  * @returns {Promise<void>}
@@ -32,7 +32,7 @@ function ask(reason) {
   const input = /** @type {HTMLInputElement} */ (document.getElementById("token"));
   /** @type {HTMLElement} */ (document.getElementById("token-reason")).textContent = reason;
   input.value = "";
-  dialog.returnValue = ""; // of an earlier time
+  dialog.returnValue = ""; // remove the value of an earlier dialog
   dialog.showModal();
   return new Promise((resolve, reject) => {
     dialog.addEventListener(

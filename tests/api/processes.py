@@ -7,14 +7,17 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import TypeVar
 from uuid import uuid4
 
 import psutil
 
 SECONDS = 120
 MARK = "ENSEMBLE_TEST_FAMILY"
+
+Result = TypeVar("Result")
 
 
 def run_python(code: str, *arguments: str) -> subprocess.CompletedProcess[str]:
@@ -23,17 +26,27 @@ def run_python(code: str, *arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, timeout=SECONDS, check=False)
 
 
-def wait_until(condition: Callable[[], object], seconds: float = SECONDS) -> float:
-    """Wait for a condition and return how many seconds it took."""
-    begin = time.monotonic()
-    while not condition():
-        assert time.monotonic() - begin < seconds, "it has not come about"
+def wait_until(condition: Callable[[], Result], seconds: float = SECONDS) -> Result:
+    """Wait until a condition returns something true, and return that.
+
+    The processes that a condition asks for may appear and end at any moment. As long as one that it needs is
+    missing (`LookupError`) or has just ended (`psutil.NoSuchProcess`), the condition is not met.
+    """
+    deadline = time.monotonic() + seconds
+    while True:
+        unmet: Exception | None = None
+        try:
+            if result := condition():
+                return result
+        except (LookupError, psutil.NoSuchProcess) as error:
+            unmet = error
+        if time.monotonic() > deadline:
+            raise TimeoutError(f"not met within {seconds:g} s") from unmet
         time.sleep(0.02)
-    return time.monotonic() - begin
 
 
 def alive(processes: Sequence[psutil.Process]) -> list[psutil.Process]:
-    """Those that still run: one that waits for its parent, or for init, to take note of its end does not."""
+    """Return the processes that run. One that has ended and only waits to be reaped does not."""
     return [process for process in processes if process.is_running() and not _is_zombie(process)]
 
 
@@ -45,7 +58,7 @@ def _is_zombie(process: psutil.Process) -> bool:
 
 
 class Family:
-    """A worker and every process that comes of it, wherever those have gone: they inherit a mark."""
+    """A worker and all its descendants, whatever their sessions and parents: they inherit a variable."""
 
     def __init__(self, store: Path, *options: str) -> None:
         self._mark = uuid4().hex
@@ -56,7 +69,7 @@ class Family:
         )
 
     def members(self) -> list[psutil.Process]:
-        """All that live, the worker included."""
+        """Return all that run, the worker included."""
         return alive([process for process in psutil.process_iter() if self._has_mark(process)])
 
     def _has_mark(self, process: psutil.Process) -> bool:
@@ -66,30 +79,35 @@ class Family:
             return False
 
     def descendants(self) -> list[psutil.Process]:
-        """All that live but the worker."""
+        """Return all that run except the worker."""
         return [process for process in self.members() if process.pid != self.worker.pid]
 
     def launcher(self) -> psutil.Process:
-        """The `mpirun` of the job."""
+        """Return the `mpirun` of the job."""
         return self._first(lambda process: process.name().startswith("mpi"))
 
     def watcher(self) -> psutil.Process:
-        """The process between the worker and the launcher."""
+        """Return the process between the worker and the launcher."""
         return self._first(lambda process: "api.worker.watcher" in process.cmdline())
 
     def rank(self, number: int) -> psutil.Process:
-        """One of the processes that simulate."""
+        """Return one of the processes that simulate."""
         return self._first(lambda process: process.environ().get("PMI_RANK") == str(number))
 
     def helper(self) -> psutil.Process:
-        """The launcher's helper, which has started the ranks."""
+        """Return the launcher's helper, which has started the ranks."""
         return self.rank(0).parent()
 
-    def _first(self, which: Callable[[psutil.Process], bool]) -> psutil.Process:
-        return next(process for process in self.descendants() if which(process))
+    def _first(self, is_wanted: Callable[[psutil.Process], bool]) -> psutil.Process:
+        """Return the first descendant that is wanted; `LookupError` if there is none at the moment."""
+        for process in self.descendants():
+            with suppress(psutil.NoSuchProcess):
+                if is_wanted(process):
+                    return process
+        raise LookupError("no such process at the moment")
 
     def end(self) -> None:
-        """Kill all of it."""
+        """Kill all of them."""
         for process in self.members():
             process.kill()
         self.worker.stdin.close()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from datetime import timedelta
 from pathlib import Path
@@ -12,8 +12,9 @@ from typing import Any
 
 import httpx
 import uvicorn
+from fastapi import APIRouter
 
-from api.app import create_app
+from api.app import COMMON_PROBLEMS, create_app
 from api.auth import TokenScope
 from api.auth.tokens import Tokens
 from api.database.service_database import Database
@@ -30,11 +31,14 @@ def make_token(store: Path, user: str, scope: TokenScope, lifetime: timedelta = 
 
 
 @contextmanager
-def serving(store: Path, **limits: Any) -> Iterator[str]:
-    """Serve a store, without workers; gives the address."""
+def serving(store: Path, routers: Iterable[APIRouter] = (), **limits: Any) -> Iterator[str]:
+    """Serve a store, without workers and perhaps with additional routes; gives the address."""
     settings = Settings(store=store, **limits)
     with open_service(settings) as service:
-        server = uvicorn.Server(server_configuration(create_app(service), settings, "127.0.0.1", 0))
+        app = create_app(service)
+        for router in routers:
+            app.include_router(router, responses=COMMON_PROBLEMS)
+        server = uvicorn.Server(server_configuration(app, settings, "127.0.0.1", 0))
         thread = threading.Thread(target=server.run)
         thread.start()
         try:
@@ -55,11 +59,13 @@ def _port(server: uvicorn.Server, thread: threading.Thread) -> int:
 
 
 @contextmanager
-def client_of(store: Path, token: str | None = None, **limits: Any) -> Iterator[httpx.Client]:
-    """Serve a store and give a client that talks to it."""
+def client_of(
+    store: Path, token: str | None = None, routers: Iterable[APIRouter] = (), **limits: Any
+) -> Iterator[httpx.Client]:
+    """Serve a store and give a client of this service."""
     headers = {} if token is None else {"Authorization": f"Bearer {token}"}
     with (
-        serving(store, **limits) as address,
+        serving(store, routers, **limits) as address,
         httpx.Client(base_url=address, headers=headers, timeout=30) as client,
     ):
         yield client

@@ -1,50 +1,96 @@
-"""The service as users start it: a process of its own with a worker beside it."""
+"""The service as users start it: `ensemble serve` in a process of its own, with workers beside it."""
 
 from __future__ import annotations
 
 import re
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from uuid import uuid4
 
-STARTED = re.compile(r"running on http://127\.0\.0\.1:(\d+)")
+import psutil
+
+from tests.api.processes import alive, wait_until
+
+SERVE = (sys.executable, "-m", "ensemble", "serve")
+SECONDS_TO_STOP = 30
+_ADDRESS = re.compile(r"running on http://[\d.]+:(\d+)")
 
 
 @dataclass(frozen=True)
-class Started:
-    """A service that answers; `log` holds what it says after its address."""
+class StartedService:
+    """A service that answers, and the file with everything that it has logged."""
 
-    process: subprocess.Popen[str]
+    process: subprocess.Popen[bytes]
     port: int
+    log: Path
 
     @property
     def url(self) -> str:
+        """The address of the service on this machine."""
         return f"http://127.0.0.1:{self.port}"
 
+    def logged(self) -> str:
+        """Return what the service has logged so far."""
+        return self.log.read_text(encoding="utf-8")
 
-def start_service(store: Path, log: Path, port: int = 0, workers: int = 1) -> Started:
-    """Run `ensemble serve`, and return when it answers."""
-    command = [sys.executable, "-m", "ensemble", "serve", "--store", str(store)]
-    with log.open("w") as output:
+    def children(self) -> list[psutil.Process]:
+        """Return the workers."""
+        return psutil.Process(self.process.pid).children()
+
+    def family(self) -> list[psutil.Process]:
+        """Return the server and all its descendants."""
+        server = psutil.Process(self.process.pid)
+        return [server, *server.children(recursive=True)]
+
+    def kill(self) -> None:
+        """Kill the server without giving it time to stop its workers."""
+        self.process.kill()
+        self.process.wait()
+
+    def stop(self) -> None:
+        """Stop the service as a user does; kill what has not stopped in time."""
+        if self.process.poll() is not None:
+            return
+        family = self.family()
+        self.process.terminate()
+        try:
+            self.process.wait(SECONDS_TO_STOP)
+        except subprocess.TimeoutExpired:
+            for member in alive(family):
+                with suppress(psutil.NoSuchProcess):
+                    member.kill()
+            self.process.wait()
+            raise
+
+
+def start_service(store: Path, *options: str, port: int = 0) -> StartedService:
+    """Run `ensemble serve` with these options, and return when it answers."""
+    log = store.with_name(f"service-{uuid4().hex}.log")
+    with log.open("wb") as output:
         process = subprocess.Popen(
-            [*command, "--port", str(port), "--workers", str(workers)], stderr=output, text=True
+            [*SERVE, f"--port={port}", f"--store={store}", *options],
+            stdout=output,
+            stderr=output,
+            start_new_session=True,
         )
-    while (found := STARTED.search(log.read_text())) is None:
-        assert process.poll() is None, log.read_text()
-        time.sleep(0.05)
-    return Started(process, int(found[1]))
+
+    def used_port() -> int:
+        assert process.poll() is None, log.read_text(encoding="utf-8")
+        found = _ADDRESS.search(log.read_text(encoding="utf-8"))
+        return 0 if found is None else int(found[1])
+
+    return StartedService(process, wait_until(used_port), log)
 
 
 @contextmanager
-def service(store: Path, log: Path, port: int = 0, workers: int = 1) -> Iterator[Started]:
-    """Run the service, and end it as a user does."""
-    started = start_service(store, log, port, workers)
+def service(store: Path, *options: str, port: int = 0) -> Iterator[StartedService]:
+    """Run `ensemble serve` with these options as long as the block runs."""
+    started = start_service(store, *options, port=port)
     try:
         yield started
     finally:
-        started.process.terminate()
-        started.process.wait()
+        started.stop()

@@ -1,4 +1,4 @@
-"""A store with something in it to ask for."""
+"""A store with runs and a boundary, made without simulations."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ SWEEP = (0.25, 0.5, 1.0, 1.5)
 
 
 def critical(rate: float) -> float:
-    """A boundary that is bent a little."""
+    """Return the critical value of the example boundary, a parabola."""
     return 0.1 + 0.5 * rate + 0.05 * rate**2
 
 
-def made_up_boundary() -> Boundary:
-    """Four converged points of `critical` and one that is still searched for."""
+def example_boundary() -> Boundary:
+    """Return a boundary of four converged points on `critical` and one whose search is not finished."""
     study = load_study("critical-hamaker")
     points = [
         BoundaryPoint(
@@ -53,11 +53,11 @@ def made_up_boundary() -> Boundary:
 
 
 def fill(path: Path) -> Path:
-    """Make a store of a run at each of `RATES` (bound from 0.75), a failed run and a boundary."""
+    """Make a store with a run at each of `RATES` (bound from 0.75), a failed run and the example boundary."""
     with Store.open(path) as store:
         for number, rate in enumerate(RATES):
             outcome = Outcome.BOUND if rate >= 0.75 else Outcome.SEPARATED
             store.save(shear_run(shear_scene(rate=rate), outcome, seed=number, frames=FRAMES))
         store.save(failed_run())
-        store.save_boundary(made_up_boundary())
+        store.save_boundary(example_boundary())
     return path

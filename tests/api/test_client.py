@@ -22,7 +22,7 @@ from solver.membrane.curve import positions
 from tests.api.processes import working
 from tests.api.servers import make_token, serving
 from tests.api.services import service, start_service
-from tests.api.stores import FRAMES, RATES, SWEEP, critical, made_up_boundary
+from tests.api.stores import FRAMES, RATES, SWEEP, critical, example_boundary
 
 SHORT = {"horizon": 4.0, "criteria.extensions": 1.0}  # a fraction of a second to simulate
 
@@ -81,7 +81,7 @@ def test_a_boundary_as_a_data_set(reader: Client) -> None:
 
 
 def test_a_critical_value_between_points(reader: Client) -> None:
-    key = made_up_boundary().study_key
+    key = example_boundary().study_key
     found = reader.critical_value(key, {"flow.rate": 0.75})
     low, high = found.uncertainty
     assert low < critical(0.75) < high
@@ -180,7 +180,7 @@ def test_a_request_whose_answer_is_lost_makes_one_job(tmp_path: Path) -> None:
 
 def test_waiting_goes_on_when_the_service_is_killed_and_started_anew(tmp_path: Path) -> None:
     store = tmp_path / "store"
-    first = start_service(store, tmp_path / "first.log", workers=0)
+    first = start_service(store, "--workers=0")
     with Client(first.url) as client:
         job = client.submit("doublet-shear", SHORT)
         finished: list[Job] = []
@@ -192,8 +192,7 @@ def test_waiting_goes_on_when_the_service_is_killed_and_started_anew(tmp_path: P
         waiting = threading.Thread(target=wait)
         waiting.start()
         assert listening.wait(timeout=20)
-        first.process.kill()
-        first.process.wait()
-        with service(store, tmp_path / "second.log", port=first.port):
+        first.kill()
+        with service(store, port=first.port):
             waiting.join(timeout=60)
     assert [job.status for job in finished] == [JobStatus.SUCCEEDED]

@@ -1,4 +1,4 @@
-/** The boundaries of the store, and one of them in full: the named one or the one that changed last. */
+/** The boundaries of the store, and one of them in detail: the selected one or the one that changed last. */
 
 import { getAll } from "../api.js";
 import { followBoundary } from "../boundary.js";
@@ -7,7 +7,7 @@ import { dateAndTime, words } from "../format.js";
 
 /** @typedef {import("../diagram.js").Boundary} Boundary */
 
-/** Presets to begin with: what they ask and how. */
+/** Presets to begin with: a question, and what is computed. */
 const BEGINNINGS = [
   ["critical-hamaker", "How much adhesion holds a doublet in shear?", "The critical Hamaker constant, shear rate by shear rate"],
   ["critical-extension-rate", "How strong a trap tears it apart?", "The critical extension rate against reduced area"],
@@ -51,7 +51,7 @@ function invitation() {
       "No boundary has been traced in this store yet. A study finds, for each value of one parameter, the " +
         "critical value of another, and keeps every simulation behind it.",
     ),
-    element("nav", { class: "shelf", "aria-label": "Ways to begin" }, element("ul", {}, ...ways)),
+    element("nav", { class: "shelf", "aria-label": "Examples to begin with" }, element("ul", {}, ...ways)),
   ];
 }
 

@@ -1,4 +1,4 @@
-/** One job: its progress as it goes, its log, and the diagram that it traces. */
+/** One job: its progress, its log and the diagram that it traces. */
 
 import { eventsOf, get, getText } from "../api.js";
 import { followBoundary } from "../boundary.js";
@@ -20,7 +20,7 @@ export async function showJob({ content, parameters, signal }) {
 
   const readLog = async () => {
     try {
-      lines.textContent = (await getText(`${address}/log`, signal)) || "Nothing has been said yet.";
+      lines.textContent = (await getText(`${address}/log`, signal)) || "The log is still empty.";
     } catch (error) {
       lines.textContent = messageOf(error);
     }
@@ -76,7 +76,7 @@ function heading(job) {
 }
 
 /**
- * Follow the diagram from the moment that the job has started.
+ * Show the diagram as soon as the job has started.
  *
  * @param {HTMLElement} place
  * @param {Job} job
@@ -91,7 +91,7 @@ function showResult(place, job, signal) {
     if (signal.aborted) {
       return;
     }
-    delete place.dataset.followed; // the first answer is not there yet; the next event tries again
+    delete place.dataset.followed; // the boundary does not exist yet; try again at the next event
     if (!(error instanceof Problem && error.status === 404)) {
       place.replaceChildren(alertAbout(error));
     }

@@ -1,4 +1,4 @@
-/** The list of jobs, with progress and cancel. */
+/** The list of jobs with their progress. */
 
 import { changesOf, get } from "../api.js";
 import { element, tableRow } from "../dom.js";
@@ -9,7 +9,7 @@ import { alertAbout } from "../problems.js";
 /** @typedef {import("../job.js").Job} Job */
 
 const COLUMNS = ["Job", "Status", "Progress", "Submitted", "Result", ""];
-const SECONDS_BETWEEN_LOOKS = 1;
+const SECONDS_BETWEEN_REQUESTS = 1;
 
 /** @param {import("../router.js").Place} place */
 export async function showJobs({ content, signal }) {
@@ -50,7 +50,7 @@ export async function showJobs({ content, signal }) {
     more.hidden = next === null;
   };
   more.addEventListener("click", () => loadOlder().catch((error) => more.replaceWith(alertAbout(error))));
-  for await (const page of changesOf("/jobs?limit=20", SECONDS_BETWEEN_LOOKS, signal)) {
+  for await (const page of changesOf("/jobs?limit=20", SECONDS_BETWEEN_REQUESTS, signal)) {
     showPage(newest, page.items);
     empty.hidden = page.items.length > 0;
     if (!older.hasChildNodes()) {
@@ -61,7 +61,7 @@ export async function showJobs({ content, signal }) {
 }
 
 /**
- * Replace the rows; the one that has the keyboard's focus keeps it.
+ * Replace the rows and keep the keyboard focus.
  *
  * @param {HTMLTableSectionElement} body
  * @param {Job[]} jobs

@@ -1,4 +1,4 @@
-/** One run: played, with its diagnostics, its results and its scene. */
+/** One run: a player, its diagnostics, its results and its scene. */
 
 import { get } from "../api.js";
 import { Cursor } from "../cursor.js";
@@ -42,7 +42,7 @@ export async function showRun({ content, parameters, query, signal }) {
   const plot = new Plot(plots, signal);
   const drawn = plot.draw(() => histories(series));
   if (frames.states.length === 0) {
-    stage.append(element("p", { class: "alert" }, "This run has no state that could be drawn."));
+    stage.append(element("p", { class: "alert" }, "This run has no recorded state that can be drawn."));
     return drawn;
   }
   const player = new Player(frames, flow, signal);
@@ -53,23 +53,23 @@ export async function showRun({ content, parameters, query, signal }) {
 }
 
 /**
- * The line in the plots follows the player, and a click in the plots moves the player there.
+ * Let the line in the plots follow the player, and a click in the plots set the time of the player.
  *
  * @param {Player} player
  * @param {Plot} plot
- * @param {Promise<void>} drawn - When the plots are.
+ * @param {Promise<void>} drawn - Resolved when the plots are drawn.
  */
 async function link(player, plot, drawn) {
   const cursor = new Cursor(plot.place, MARGIN);
   plot.place.after(cursor.line);
   plot.on("plotly_click", ({ points: [point] }) => player.rest(point.x));
-  plot.on("plotly_afterplot", () => cursor.show(player.time)); // zoomed, resized, or in other colors
+  plot.on("plotly_afterplot", () => cursor.show(player.time)); // after zooming, resizing or changing colors
   await drawn;
   player.onTime((time) => cursor.show(time));
 }
 
 /**
- * The address names the time at which the player was stopped.
+ * Keep the time at which the player stops in the address.
  *
  * @param {Player} player
  * @param {URLSearchParams} query
@@ -96,21 +96,21 @@ function heading({ key, outcome, time, scene, failure }) {
 
 /** @param {any} run */
 function results({ period, gap, inclination_angle, viscosity, energy, error, work }) {
-  const known = (/** @type {any} */ value) => (value === null || value === undefined ? null : number(value));
+  const orNull = (/** @type {any} */ value) => (value === null || value === undefined ? null : number(value));
   return element(
     "section",
     { class: "results" },
     element("h2", {}, "Results"),
     definitions([
-      ["Period", known(period)],
-      ["Gap", known(gap)],
+      ["Period", orNull(period)],
+      ["Gap", orNull(gap)],
       ["Inclination", inclination_angle === null ? null : `${number(inclination_angle)}°`],
-      ["Viscosity [μ]", known(viscosity?.total)],
-      ["– bending + tension", known(viscosity?.bending_tension)],
-      ["– adhesion", known(viscosity?.adhesion)],
-      ["– viscosity contrast", known(viscosity?.contrast)],
-      ["Bending energy", known(energy.bending)],
-      ["Adhesion energy", known(energy.adhesion)],
+      ["Viscosity [μ]", orNull(viscosity?.total)],
+      ["– bending + tension", orNull(viscosity?.bending_tension)],
+      ["– adhesion", orNull(viscosity?.adhesion)],
+      ["– viscosity contrast", orNull(viscosity?.contrast)],
+      ["Bending energy", orNull(energy.bending)],
+      ["Adhesion energy", orNull(energy.adhesion)],
       ["Area error", number(error.area, 2)],
       ["Closure error", number(error.closure, 2)],
       ["Temporal error", number(error.temporal, 2)],

@@ -1,4 +1,4 @@
-/** The runs of the store, filtered by conditions on their scenes and results. */
+/** The runs of the store that meet conditions on their scenes and results. */
 
 import { get } from "../api.js";
 import { element, tableRow } from "../dom.js";
@@ -59,7 +59,7 @@ function row({ key, outcome, scene, time, created }) {
 }
 
 /**
- * Conditions are part of the address, so a selection can be linked to.
+ * Make the form of conditions. They are part of the address, so that a selection has a link.
  *
  * @param {URLSearchParams} query
  */

@@ -7,7 +7,7 @@ import pytest
 from ensemble.search.boundary import Boundary
 from ensemble.store import Store
 from tests.api.servers import client_of
-from tests.api.stores import SWEEP, critical, made_up_boundary
+from tests.api.stores import SWEEP, critical, example_boundary
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +29,7 @@ def test_a_boundary_is_the_stored_one_and_a_line(reading, address, filled_store)
 
 
 def test_boundaries_are_filtered_and_paged(tmp_path):
-    boundary = made_up_boundary()
+    boundary = example_boundary()
     keys = [f"{number:016x}" for number in range(5)]
     with Store.open(tmp_path / "store") as store, client_of(store.path) as client:
         for key in reversed(keys):
@@ -45,13 +45,13 @@ def test_boundaries_are_filtered_and_paged(tmp_path):
 
 
 def test_a_boundary_that_has_changed_is_sent_again(tmp_path):
-    boundary = made_up_boundary()
+    boundary = example_boundary()
     with Store.open(tmp_path / "store") as store, client_of(store.path) as client:
         store.save_boundary(boundary)
         first = client.get(f"/boundaries/{boundary.study_key}")
         tag = {"If-None-Match": first.headers["etag"]}
         assert client.get(f"/boundaries/{boundary.study_key}", headers=tag).status_code == 304
-        grown = made_up_boundary().model_copy(update={"points": boundary.points[:2]})
+        grown = example_boundary().model_copy(update={"points": boundary.points[:2]})
         store.save_boundary(grown)
         second = client.get(f"/boundaries/{boundary.study_key}", headers=tag)
         assert len(second.json()["points"]) == 2
@@ -116,7 +116,7 @@ def test_an_unknown_boundary_is_not_found(reading):
 
 
 def test_a_boundary_without_a_converged_point_has_no_value(tmp_path):
-    boundary = made_up_boundary()
+    boundary = example_boundary()
     with Store.open(tmp_path / "store") as store, client_of(store.path) as client:
         store.save_boundary(boundary.model_copy(update={"points": boundary.points[-1:]}))
         response = client.get(f"/boundaries/{boundary.study_key}/at", params={"flow.rate": 1})

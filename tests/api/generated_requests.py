@@ -1,4 +1,4 @@
-"""Requests made up from the description of the service in OpenAPI, with the checks of schemathesis."""
+"""Requests that schemathesis generates from the OpenAPI description of the service, with its checks."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from ensemble.store import Store
 from tests.api.servers import make_token, serving
 from tests.api.stores import fill
 
-# Keys of things that are there, or most requests would find nothing.  What a schema cannot say, such as that
-# vesicles must not overlap, is refused with 422.
+# Keys that exist: with random ones most requests would end in 404. A schema cannot express every rule, for
+# example that vesicles must not overlap, so valid documents may be refused with 422.
 CONFIGURATION = """
 [checks.positive_data_acceptance]
 expected-statuses = ["2xx", "404", "422"]
@@ -30,25 +30,25 @@ parameters = {{ "path.key" = "{boundary}" }}
 
 
 @dataclass(frozen=True)
-class RequestVerdict:
-    """How many requests were made, and what schemathesis says of the answers."""
+class GeneratedRequests:
+    """How many requests were sent, whether all answers passed the checks, and the report of schemathesis."""
 
     cases: int
     passed: bool
     text: str
 
 
-def try_everything(directory: Path, *options: str, seconds: float) -> RequestVerdict:
-    """Serve a filled store and send what schemathesis makes up.
+def send_generated_requests(directory: Path, *options: str, seconds: float) -> GeneratedRequests:
+    """Serve a filled store, and send generated requests.
 
     Parameters
     ----------
     directory : Path
-        An empty one.
-    options : str
-        Of ``schemathesis run``.
+        An empty directory.
+    *options : str
+        Options of ``schemathesis run``.
     seconds : float
-        After which the run is given up.
+        Time limit.
     """
     store = fill(directory / "store")
     with Store.existing(store) as opened:
@@ -59,9 +59,9 @@ def try_everything(directory: Path, *options: str, seconds: float) -> RequestVer
     )
     token = make_token(store, "ada", TokenScope.SUBMIT)
     command = [str(Path(sys.executable).with_name("schemathesis")), "run", "--checks=all", "--no-color"]
-    # To delete a job is to dismiss it: it stays, as one that has been dismissed.
+    # DELETE dismisses a job; the job stays and can be read.
     command += ["--exclude-checks=use_after_free"]
-    # What listens to a job does not end before the job, and nobody runs any here.
+    # Events end with the job, and no worker runs it here.
     command += ["--exclude-path-regex=/events$", f"--header=Authorization: Bearer {token}", *options]
     unlimited = {"request_rate": "1000000/second", "refusal_rate": "1000000/second", "maximum_jobs": 10**6}
     with serving(store, **unlimited) as address:
@@ -74,4 +74,6 @@ def try_everything(directory: Path, *options: str, seconds: float) -> RequestVer
             check=False,
         )
     counted = re.search(r"(\d+) generated", done.stdout)
-    return RequestVerdict(int(counted[1]) if counted else 0, done.returncode == 0, done.stdout + done.stderr)
+    return GeneratedRequests(
+        int(counted[1]) if counted else 0, done.returncode == 0, done.stdout + done.stderr
+    )
