@@ -33,7 +33,7 @@ class Settings(BaseSettings):
 
     model_config = SettingsConfigDict(env_prefix="ENSEMBLE_", frozen=True, extra="ignore")
 
-    store: Path = Field(DEFAULT_STORE, description="Directory of the store: the option --store of the commands.")
+    store: Path = Field(DEFAULT_STORE, description="Directory of the store: the option --store.")
     database: str | None = Field(
         None, description="URL of a PostgreSQL database for jobs, tokens and the catalogs of new stores."
     )

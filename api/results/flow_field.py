@@ -45,6 +45,10 @@ class FlowDescription(BaseModel):
         Parameters
         ----------
         flow : type
+
+        Returns
+        -------
+        FlowDescription
         """
         parameters = {
             field: ParameterName(name=symbol.name, symbol=symbol.text)
