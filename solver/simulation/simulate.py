@@ -16,15 +16,18 @@ from solver.analysis.outcome import History, criteria_of, latest_time, may_tumbl
 from solver.analysis.revolutions import LongAxisTracker, RevolutionTracker
 from solver.analysis.run import LARGEST_SPATIAL, Energy, Errors, Outcome, Run, Work
 from solver.forces.tension import TensionNotFoundError
-from solver.integrators import StepFailedError
+from solver.integrators import Step, StepFailedError
 from solver.membrane.geometry import Membranes
 from solver.parallel import SERIAL, Parallel, first_rank_asks, require_agreement
-from solver.scene import Scene, Start
+from solver.scene import Output, Scene, Start
 from solver.simulation.initial_state import initial_ellipses, rotated_state
 from solver.simulation.resolution import UnresolvedError, carried, resolution_of, with_points
 from solver.simulation.segment import Segment, SegmentWork
 
 Array = NDArray[np.float64]
+
+# While a start relaxes, whatever the scene records: when the relaxation ends depends on when it is sampled.
+_RELAXATION_OUTPUT = Output(interval=2.0, frame_interval=10.0)
 
 
 class Cancelled(Exception):  # noqa: N818  an outcome of the caller's own wish, not an error
@@ -107,7 +110,7 @@ def simulate(
                 progress.smallest_step = min(progress.smallest_step or taken, taken)
             if turns:
                 step = turns.advance(step)
-            _record_up_to(step.end, step.interpolate, recorder, scene.output.interval)
+            _record_during(step, recorder, scene.output.interval)
             progress.time, progress.state = step.end, step.state
             progress.steps += 1
             progress.rejected += step.shortened
@@ -156,7 +159,14 @@ def _start(scene: Scene, points: int, parallel: Parallel, should_stop: Callable[
     placed = initial_ellipses(with_points(scene, points))
     if not scene.start.relaxed:
         return _Start(points, placed)
-    at_rest = scene.model_copy(update={"flow": None, "start": Start(), "horizon": scene.start.horizon})
+    at_rest = scene.model_copy(
+        update={
+            "flow": None,
+            "start": Start(),
+            "horizon": scene.start.horizon,
+            "output": _RELAXATION_OUTPUT,
+        }
+    )
     relaxed = simulate(at_rest, parallel=parallel, should_stop=should_stop)
     if relaxed.outcome is not Outcome.EQUILIBRIUM:
         reason = relaxed.failure or f"{relaxed.outcome} at time {relaxed.time:g}"
@@ -171,13 +181,13 @@ def _start(scene: Scene, points: int, parallel: Parallel, should_stop: Callable[
     return _Start(points, turned, relaxed.work.rhs_evaluations)
 
 
-def _record_up_to(
-    end: float, interpolate: Callable[[float], Array], recorder: Recorder, interval: float
-) -> None:
+def _record_during(step: Step, recorder: Recorder, interval: float) -> None:
     """Record all multiples of ``interval`` that the last step has passed."""
     recorded = round(recorder.values["time"][-1] / interval)
-    for index in range(recorded + 1, int(np.floor(end / interval)) + 1):
-        recorder.record(index * interval, interpolate(index * interval))
+    for index in range(recorded + 1, int(np.floor(step.end / interval)) + 1):
+        time = index * interval
+        # At its end the interpolant differs from the state by round-off.
+        recorder.record(time, step.state if time == step.end else step.interpolate(time))
 
 
 def _summary(
