@@ -271,8 +271,8 @@ def _boundary(store: Store, name: str) -> Boundary | None:
 def _draw(store: Store, shown: Boundary | str, output: Path) -> None:
     from ensemble.config.dotted_paths import parameter_value
     from ensemble.figures import phase_diagram, run_figure, save
+    from ensemble.figures.figure_files import FIGURE_SUFFIXES, suffix_among
     from ensemble.figures.movie import MOVIE_SUFFIXES, save_movie
-    from ensemble.figures.output import FIGURE_SUFFIXES, suffix_among
 
     if isinstance(shown, str):
         if suffix_among(output, (*FIGURE_SUFFIXES, *MOVIE_SUFFIXES)) in MOVIE_SUFFIXES:

@@ -1,11 +1,10 @@
-"""Figures for people: the phase diagram of a study, and what happened in a run.
+"""Figures: the phase diagram of a study, snapshots and diagnostics of a run, and movies.
 
-Figures are built with matplotlib's objects alone, without pyplot, so that they need no display and leave no
-state behind.
+Figures are built from matplotlib's objects without pyplot, so they need no display and leave no state behind.
 """
 
 from ensemble.figures.diagram import phase_diagram
+from ensemble.figures.figure_files import save
 from ensemble.figures.history import run_figure
-from ensemble.figures.output import save
 
 __all__ = ["phase_diagram", "run_figure", "save"]

@@ -1,4 +1,4 @@
-"""The phase diagram of a study: every run, the brackets of the boundary and a straight line through it."""
+"""The phase diagram of a study: its runs, the brackets of the boundary, and a straight line through them."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ from solver.scene import Scene
 
 @matplotlib.rc_context(STYLE)
 def phase_diagram(boundary: Boundary, runs: Sequence[tuple[float, float, Outcome]]) -> Figure:
-    """Draw where in the plane of two parameters vesicles stay together.
+    """Draw the runs and the boundary of a study in the plane of its two parameters.
 
     Parameters
     ----------
     boundary : Boundary
-        Its sweep parameter is drawn on x, its searched parameter on y.
-    runs : sequence of (sweep value, searched value, outcome)
-        Every run is one mark.
+        Its swept parameter is drawn along x, its searched parameter along y.
+    runs : sequence of (float, float, Outcome)
+        Swept value, searched value and outcome of each run.
 
     Returns
     -------
     Figure
-        The artists' group ids are ``run <outcome>``, ``bracket``, ``boundary`` and ``fit``.
+        The group ids of its artists are ``run <outcome>``, ``bracket``, ``boundary`` and ``fit``.
     """
     swept = boundary.study["sweep"]["parameter"]
     searched = boundary.study["search"]["parameter"]
@@ -44,11 +44,11 @@ def phase_diagram(boundary: Boundary, runs: Sequence[tuple[float, float, Outcome
     axes.set_title(describe(scene, without=(swept, searched)), pad=10)
     _draw_runs(axes, runs)
     points = sorted(boundary.points, key=lambda point: point.parameters[swept])
-    known = [point for point in points if point.critical_value is not None]
-    if known:
-        _draw_brackets(axes, known, swept)
-        _draw_boundary(axes, known, swept, y)
-    converged = [point for point in known if point.status == Status.CONVERGED]
+    bracketed = [point for point in points if point.critical_value is not None]
+    if bracketed:
+        _draw_brackets(axes, bracketed, swept)
+        _draw_boundary(axes, bracketed, swept, y)
+    converged = [point for point in bracketed if point.status == Status.CONVERGED]
     if (line := line_through(boundary)) is not None:
         _draw_fit(axes, line, [point.parameters[swept] for point in converged], x, y)
     axes.margins(0.06)
@@ -59,10 +59,10 @@ def phase_diagram(boundary: Boundary, runs: Sequence[tuple[float, float, Outcome
 
 def _draw_runs(axes: Axes, runs: Sequence[tuple[float, float, Outcome]]) -> None:
     for outcome, mark in MARKS.items():
-        chosen = np.array([(sweep, value) for sweep, value, result in runs if result == outcome])
-        if chosen.size:
+        places = np.array([(sweep, value) for sweep, value, result in runs if result == outcome])
+        if places.size:
             axes.plot(
-                *chosen.T,
+                *places.T,
                 linestyle="none",
                 marker=mark.shape,
                 color=mark.color,
@@ -75,11 +75,11 @@ def _draw_runs(axes: Axes, runs: Sequence[tuple[float, float, Outcome]]) -> None
             )
 
 
-def _draw_brackets(axes: Axes, known: Sequence[BoundaryPoint], swept: str) -> None:
-    ends = np.array([point.bracket for point in known], dtype=float)
-    certified = sum(point.certified for point in known)
+def _draw_brackets(axes: Axes, bracketed: Sequence[BoundaryPoint], swept: str) -> None:
+    ends = np.array([point.bracket for point in bracketed], dtype=float)
+    certified = sum(point.certified for point in bracketed)
     _, _, (bars,) = axes.errorbar(
-        [point.parameters[swept] for point in known],
+        [point.parameters[swept] for point in bracketed],
         ends.mean(axis=1),
         yerr=np.ptp(ends, axis=1) / 2,
         fmt="none",
@@ -88,14 +88,14 @@ def _draw_brackets(axes: Axes, known: Sequence[BoundaryPoint], swept: str) -> No
         capsize=5.5,
         capthick=1.0,
         zorder=3,
-        label=f"bracket ({certified} of {len(known)} certified)",
+        label=f"bracket ({certified} of {len(bracketed)} certified)",
     )
     bars.set_gid("bracket")
 
 
-def _draw_boundary(axes: Axes, known: Sequence[BoundaryPoint], swept: str, y: Quantity) -> None:
+def _draw_boundary(axes: Axes, bracketed: Sequence[BoundaryPoint], swept: str, y: Quantity) -> None:
     axes.plot(
-        *_critical_values(known, swept),
+        *_critical_values(bracketed, swept),
         color=GRAY,
         zorder=1.5,
         label=f"critical value ${y.critical}$",
@@ -117,6 +117,6 @@ def _draw_fit(axes: Axes, line: Line, sweep: Sequence[float], x: Quantity, y: Qu
     )
 
 
-def _critical_values(known: Sequence[BoundaryPoint], swept: str) -> tuple[Array, Array]:
-    sweep = np.array([point.parameters[swept] for point in known])
-    return sweep, np.array([point.critical_value for point in known], dtype=float)
+def _critical_values(bracketed: Sequence[BoundaryPoint], swept: str) -> tuple[Array, Array]:
+    sweep = np.array([point.parameters[swept] for point in bracketed])
+    return sweep, np.array([point.critical_value for point in bracketed], dtype=float)

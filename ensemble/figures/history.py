@@ -1,4 +1,4 @@
-"""What happened in a run: its membranes and, below them, its diagnostics against time."""
+"""The figure of a run: snapshots of its membranes and, below them, its diagnostics against time."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from solver.analysis.run import Array, Run
 # Heights in inches.
 _PANEL = 1.8
 _LINE = 0.2
-_STRIP = (0.3, 3.0)  # of the membranes, at least and at most
-_AROUND_STRIP = 0.85  # their times above and the color bar below
+_SNAPSHOTS = (0.3, 3.0)  # of the snapshots, at least and at most
+_AROUND_SNAPSHOTS = 0.85  # for the times above them and the color bar below
 
 _CLUSTERS = (
     f"filled: vesicles nearer than {CONTACT:g} adhesion distances to each other, a color for each cluster"
@@ -31,7 +31,7 @@ _CHARACTERS = 105  # in a line of the heading
 
 @matplotlib.rc_context(STYLE)
 def run_figure(run: Run) -> Figure:
-    """Draw snapshots colored by tension and, as far as the run has them, its diagnostics against time.
+    """Draw snapshots colored by tension, and the diagnostics of a run against time.
 
     Parameters
     ----------
@@ -40,9 +40,10 @@ def run_figure(run: Run) -> Figure:
     Returns
     -------
     Figure
-        Its axes are labeled ``membranes``, ``tension`` (the color bar) and, below, by the first of the series
-        that they show: ``gap``, ``center_angle``, ``inclination_angle``, ``clusters``,
-        ``bending_energy``, ``viscosity_bending_tension``.
+        Its axes have the labels ``membranes``, ``tension`` (the color bar) and, for each panel below, the
+        name of the first series that it shows: ``gap``, ``center_angle``, ``inclination_angle``,
+        ``clusters``, ``bending_energy``, ``viscosity_bending_tension``.  A panel whose series the run does
+        not have is left out.
     """
     panels = {name: draw for name, draw in PANELS.items() if name in run.series}
     columns = 3 if len(panels) == 3 else 2
@@ -52,14 +53,14 @@ def run_figure(run: Run) -> Figure:
     figure = Figure(layout="constrained")
     figure.suptitle("\n".join(heading), fontsize="medium")
     grid = figure.add_gridspec(2, 1)
-    strip = figure.add_subplot(grid[0], label="membranes")
+    snapshots = figure.add_subplot(grid[0], label="membranes")
     clusters = _clusters(run)
-    membranes = draw_snapshots(strip, run.scene, run.frames, clusters)
+    membranes = draw_snapshots(snapshots, run.scene, run.frames, clusters)
     if clusters is not None:
-        strip.annotate(
+        snapshots.annotate(
             _CLUSTERS, (0, 0), (0, -2), "axes fraction", "offset points", va="top", fontsize="small"
         )
-    add_tension_bar(figure, membranes, strip, extended_ends(membranes))
+    add_tension_bar(figure, membranes, snapshots, extended_ends(membranes))
 
     cells = grid[1].subgridspec(rows, columns)
     for position, (name, draw) in enumerate(panels.items()):
@@ -71,14 +72,14 @@ def run_figure(run: Run) -> Figure:
         for time in run.frames.time[choose_snapshots(run.frames)]:
             axes.axvline(time, color=GRAY, alpha=0.3, linewidth=0.7, zorder=0.5)
 
-    height = np.clip(WIDTH * np.ptp(strip.get_ylim()) / np.ptp(strip.get_xlim()), *_STRIP)
+    height = np.clip(WIDTH * np.ptp(snapshots.get_ylim()) / np.ptp(snapshots.get_xlim()), *_SNAPSHOTS)
     grid.set_height_ratios([height, rows * _PANEL])
-    figure.set_size_inches(WIDTH, len(heading) * _LINE + height + _AROUND_STRIP + rows * _PANEL)
+    figure.set_size_inches(WIDTH, len(heading) * _LINE + height + _AROUND_SNAPSHOTS + rows * _PANEL)
     return figure
 
 
 def _clusters(run: Run) -> Array | None:
-    """Number of the cluster of each vesicle in each frame, as it was recorded nearest in time."""
+    """Return the number of the cluster of each vesicle in each frame, from the record nearest in time."""
     labels = run.vesicle_series.get("vesicle_cluster")
     if labels is None:
         return None
@@ -87,7 +88,7 @@ def _clusters(run: Run) -> Array | None:
 
 
 def _heading(run: Run) -> list[str]:
-    """Return the scene in one line, then the outcome and why a failed run failed, wrapped."""
+    """Return the scene in one line, then the outcome and the reason of a failure in lines that fit."""
     outcome = f"{run.outcome} at $t$ = {run.time:.4g}"
     if run.period is not None:
         outcome += f", period {run.period:.4g}"

@@ -1,4 +1,4 @@
-"""Moving pictures of a run: membranes colored by tension in the imposed flow, beside diagnostics."""
+"""Movies of a run: membranes colored by tension in the imposed flow, with diagnostics at their side."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from solver.flows import ImposedFlow
 
 _PACE = 8.0  # units of time a second: a doublet at shear rate 0.5 takes about five seconds a turn
 _DURATION = (5.0, 20.0)  # seconds, at least and at most
-_HOLD = 1.0  # second for which the last state stays before a player begins again
+_HOLD = 1.0  # seconds for which the last state is shown before a player starts again
 
 _SIZE = (8.0, 4.5)  # inches
 _TRACES = 2  # diagnostics beside the membranes, at most
@@ -47,11 +47,11 @@ _ARROWS = 12  # of the flow, along the longer side of the view
 
 
 class _Format(NamedTuple):
-    """How moving pictures of one kind are written."""
+    """How movies of one format are written."""
 
     writer: Callable[..., AbstractMovieWriter]
     options: dict[str, Any]
-    rate: int  # pictures a second
+    rate: int  # pictures per second
     resolution: int  # dots per inch
 
 
@@ -63,16 +63,16 @@ MOVIE_SUFFIXES: Final = tuple(_FORMATS)
 
 
 def save_movie(run: Run, path: Path) -> None:
-    """Write moving pictures of a run in the format that the file's suffix names.
+    """Write a movie of a run, in the format that the suffix of the file names.
 
-    They last from 5 to 20 seconds, whatever the run's recorded interval: states between two frames are
-    interpolated.  The file appears complete or not at all, replacing an earlier one.
+    It lasts from 5 to 20 seconds.  States between two frames are interpolated, so this does not depend on how
+    often the run was recorded.  The file appears complete or not at all, replacing an earlier one.
 
     Parameters
     ----------
     run : Run
     path : Path
-        Ends in ``.mp4`` (1280 × 720, 30 pictures a second) or ``.gif`` (640 × 360, 20 a second).
+        Its suffix is ``.mp4`` (1280 × 720, 30 pictures per second) or ``.gif`` (640 × 360, 20 per second).
 
     Raises
     ------
@@ -82,7 +82,7 @@ def save_movie(run: Run, path: Path) -> None:
         If the file cannot be written; it says what the encoder said.
     """
     form = _FORMATS[path.suffix.lower()]
-    # The encoder is the one that a wheel brought, whatever the machine has.
+    # The encoder of the package imageio-ffmpeg, whether or not the machine has one.
     encoder = matplotlib.RcParams({"animation.ffmpeg_path": imageio_ffmpeg.get_ffmpeg_exe()})
     with matplotlib.rc_context(STYLE), matplotlib.rc_context(encoder), replacing(path) as unfinished:
         picture = Picture(run, form.resolution)
@@ -100,13 +100,18 @@ def save_movie(run: Run, path: Path) -> None:
 
 
 def picture_times(frames: Frames, rate: int) -> Array:
-    """Times of a run that are shown one after the other, equally spaced, the last one for a while.
+    """Return the times that the pictures of a movie show.
 
     Parameters
     ----------
     frames : Frames
     rate : int
-        Pictures a second.
+        Pictures per second.
+
+    Returns
+    -------
+    (pictures,)
+        Equally spaced; the last time is repeated for a while.
     """
     first, last = frames.time[[0, -1]]
     duration = np.clip((last - first) / _PACE, *_DURATION) if last > first else 0.0
@@ -115,7 +120,7 @@ def picture_times(frames: Frames, rate: int) -> Array:
 
 
 class Picture:
-    """One picture that can show a run at any of its times.
+    """One picture that can show a run at any time.
 
     Parameters
     ----------
@@ -126,17 +131,17 @@ class Picture:
     Attributes
     ----------
     figure : Figure
-        What stays is an image in it, drawn once.  Its axes are labeled ``membranes``, ``tension`` (the color
-        bar) and by the series that they trace.
+        Its axes have the labels ``membranes``, ``tension`` (the color bar) and the names of the series that
+        they show.  Whatever does not move is drawn once and is an image in it.
     frames : Frames
-        Those of the run of which every number is finite; `show` interpolates between them.
+        The frames of the run in which all numbers are finite; `show` interpolates between them.
     membranes : LineCollection
         Its segments are ordered by vesicle and arclength.
 
     Raises
     ------
     ValueError
-        If the run has no such frame.
+        If the run has no frame in which all numbers are finite.
     """
 
     @matplotlib.rc_context(STYLE)
@@ -174,7 +179,13 @@ class Picture:
         self._freeze([*arrows, self._inside, self.membranes, self._time, *self._cursors])
 
     def show(self, time: float) -> None:
-        """Change the picture to what it shows at this time, one of the frames' or between two."""
+        """Show the state at a time.
+
+        Parameters
+        ----------
+        time : float
+            Between the times of the first and the last frame.
+        """
         tangent_angle, centers, tension_at_points = (values(time) for values in self._between)
         ends, tension = membrane_segments(self._scene, tangent_angle, centers, tension_at_points)
         self.membranes.set_segments(list(ends.reshape(-1, 2, 2)))
@@ -201,7 +212,7 @@ class Picture:
         return axes
 
     def _freeze(self, moving: Collection[Artist]) -> None:
-        """Turn all else into an image, since drawing axes takes most of the time of a picture."""
+        """Turn everything that does not move into an image: drawing axes takes most of the time."""
         for artist in moving:
             artist.set_visible(False)
         canvas = FigureCanvasAgg(self.figure)
@@ -223,21 +234,21 @@ def _drawable(frames: Frames) -> Frames:
 
 
 def _interpolant(time: Array, values: Array) -> Callable[[float], Array]:
-    """Values (frames, ...) as a function of time: cubic between frames, without overshooting."""
+    """Return values (frames, ...) as a function of time: cubic between frames, without overshooting."""
     if len(time) == 1:
         return lambda _: values[0]
     return Akima1DInterpolator(time, values, method="makima")
 
 
 def _fit(axes: Axes, reach: Array) -> None:
-    """Show as much as lies within ``reach`` (2,) of the origin, with equal scales, and fill the axes."""
+    """Fill the axes with equal scales so that they show everything within ``reach`` (2,) of the origin."""
     shape = np.array(axes.bbox.size)
     x, y = shape * (reach / shape).max()
     axes.set(xlim=(-x, x), ylim=(-y, y))
 
 
 class _FlowArrows:
-    """Faint arrows of the imposed velocity relative to that at the vesicles' mean, wherever the axes show."""
+    """Faint arrows of the imposed velocity, relative to its value at the mean of the centers."""
 
     arrows: Quiver
 
@@ -261,14 +272,14 @@ class _FlowArrows:
         )
 
     def show(self, centers: Array) -> None:
-        """Show the flow while the vesicles' centers, (2, vesicles), are there."""
+        """Show the flow for vesicles with these centers, (2, vesicles)."""
         middle = centers.mean(axis=1)[:, None, None]
         velocity = self._flow.velocity(middle + self._places, centers) - self._flow.velocity(middle, centers)
-        fastest = np.hypot(*velocity).max() or 1.0  # relative to it, a uniform flow rests
+        fastest = np.hypot(*velocity).max() or 1.0  # a uniform flow has no relative velocity
         self.arrows.set_UVC(*(velocity * (0.9 * self._spacing / fastest)))
 
 
 def _inner(limits: Array, spacing: float) -> Array:
-    """Multiples of the spacing between the limits, not at their very edge."""
+    """Return the multiples of the spacing between two limits, without those at their very edge."""
     most = np.floor((limits[1] - spacing / 2) / spacing)
     return spacing * np.arange(-most, most + 1)

@@ -1,4 +1,4 @@
-"""Diagnostics of a run against time, one small plot each."""
+"""Panels that show a diagnostic of a run against time."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def _draw_inclination(axes: Axes, run: Run) -> None:
 
 
 def _draw_parts(axes: Axes, run: Run, membrane: str, label: str, adhesion: str) -> None:
-    """Draw what membranes contribute and, if there is adhesion, what that contributes."""
+    """Draw the contribution of the membranes and, if there is adhesion, that of adhesion."""
     axes.plot(run.series["time"], run.series[membrane], color=BLUE, label=label)
     if adhesion in run.series:
         axes.plot(
@@ -88,7 +88,7 @@ def _draw_clusters(axes: Axes, run: Run) -> None:
     axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=2, borderaxespad=0.2)
 
 
-# By the series without which a panel is left out.
+# By the series that a run must have.
 PANELS: Final[dict[str, Callable[[Axes, Run], None]]] = {
     "gap": _draw_gap,
     "center_angle": _draw_center_angle,

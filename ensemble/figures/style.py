@@ -1,4 +1,4 @@
-"""How every figure looks: fonts, sizes, a colorblind-safe palette and the mark of each outcome."""
+"""The look of all figures: fonts, sizes, a colorblind-safe palette and the mark of each outcome."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ _OF_THE_PROCESS = (
     "savefig.directory",
 )
 
-# Applied while a figure is built and again while it is written, since ticks are made as late as that.  It
-# begins with the defaults of the library: what a user has set for figures of their own changes none of these.
+# Applied while a figure is built and again while it is written, because ticks are made only then.  It
+# begins with the defaults of the library, so that a user's own settings change none of these figures.
 STYLE: Final = matplotlib.RcParams(
     {
         name: value
@@ -76,22 +76,50 @@ TENSION_COLORS: Final = ListedColormap(
 
 @dataclass(frozen=True)
 class Mark:
-    """How an outcome is drawn; color and shape each tell it apart from every other."""
+    """The mark of an outcome, which differs from all others in color and in shape.
+
+    Attributes
+    ----------
+    color, shape : str
+        As matplotlib names them.
+    face, edge : str
+        Colors of its area and of its rim.
+    edge_width : float
+        Width of the rim, in points.
+    """
 
     color: str
     shape: str
     face: str
     edge: str
-    edge_width: float  # points
+    edge_width: float
 
     @classmethod
     def filled(cls, color: str, shape: str) -> Mark:
-        """Return a solid mark; its thin white rim keeps marks apart where they crowd."""
+        """Return a solid mark with a thin white rim, which separates marks that overlap.
+
+        Parameters
+        ----------
+        color, shape : str
+
+        Returns
+        -------
+        Mark
+        """
         return cls(color, shape, face=color, edge="white", edge_width=0.5)
 
     @classmethod
     def hollow(cls, color: str, shape: str) -> Mark:
-        """Return an outlined mark, for runs that say nothing about the boundary."""
+        """Return an outlined mark, for runs that do not decide about the boundary.
+
+        Parameters
+        ----------
+        color, shape : str
+
+        Returns
+        -------
+        Mark
+        """
         return cls(color, shape, face="white", edge=color, edge_width=1.2)
 
 

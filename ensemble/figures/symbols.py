@@ -1,4 +1,4 @@
-"""Names and symbols, as the field writes them, of a scene's parameters."""
+"""Names and symbols of the parameters of a scene, for figures."""
 
 from __future__ import annotations
 
@@ -11,14 +11,31 @@ from solver.scene import Scene
 
 @dataclass(frozen=True)
 class Quantity:
-    """A parameter's words for an axis, and its symbol in TeX without dollar signs."""
+    """A parameter of a scene as figures show it.
+
+    Attributes
+    ----------
+    label : str
+        Label of an axis.
+    symbol : str
+        Symbol in TeX, without dollar signs.
+    """
 
     label: str
     symbol: str
 
     @classmethod
     def named(cls, name: str, symbol: str) -> Quantity:
-        """Return a quantity whose label is its name followed by its symbol."""
+        """Return a quantity whose label is its name followed by its symbol.
+
+        Parameters
+        ----------
+        name, symbol : str
+
+        Returns
+        -------
+        Quantity
+        """
         return cls(f"{name}, ${symbol}$", symbol)
 
     @property
@@ -47,13 +64,16 @@ _OF_THE_FLOW = "flow."
 def quantity(path: str, flow: ImposedFlow | type[ImposedFlow] | None = None) -> Quantity:
     """Return the quantity at a dotted path of a scene.
 
-    A path that has no established symbol stands for itself.
-
     Parameters
     ----------
     path : str
-    flow : ImposedFlow, optional
-        The scene's flow, or its class: it names its own parameters.
+    flow : ImposedFlow or type of ImposedFlow, optional
+        The flow of the scene, which has the names and symbols of its own parameters.
+
+    Returns
+    -------
+    Quantity
+        Named by its path if it has no established symbol.
     """
     if flow is not None and path.startswith(_OF_THE_FLOW):
         symbol = flow.symbols.get(path.removeprefix(_OF_THE_FLOW))
@@ -64,13 +84,18 @@ def quantity(path: str, flow: ImposedFlow | type[ImposedFlow] | None = None) -> 
 
 
 def describe(scene: Scene, without: Collection[str] = ()) -> str:
-    """One line on a scene: its flow, and its parameters as far as it has them and they tell it from others.
+    """Describe a scene in one line: its vesicles, its flow, and its parameters.
 
     Parameters
     ----------
     scene : Scene
     without : collection of str
-        Dotted paths of parameters to leave out, for instance because they are the figure's axes.
+        Dotted paths of parameters to leave out, for instance because they are the axes of the figure.
+
+    Returns
+    -------
+    str
+        Symbols are in TeX.  Parameters that the scene does not have, or that have no effect, are left out.
     """
     values: dict[str, list[float]] = {}
     if scene.flow is not None:
@@ -86,7 +111,7 @@ def describe(scene: Scene, without: Collection[str] = ()) -> str:
         if scene.adhesion.cutoff is not None:
             values["adhesion.cutoff"] = [scene.adhesion.cutoff]
     count = len(scene.vesicles)
-    words = [
+    subject = [
         f"{count} vesicles" if count > 1 else "1 vesicle",
         f"in {scene.flow.title if scene.flow else 'quiescent fluid'}",
     ]
@@ -95,11 +120,11 @@ def describe(scene: Scene, without: Collection[str] = ()) -> str:
         for path, numbers in values.items()
         if path not in without
     ]
-    return ", ".join([" ".join(words), *parameters])
+    return ", ".join([" ".join(subject), *parameters])
 
 
 def _numbers(values: list[float]) -> str:
-    """Each of a few numbers, the ends of many."""
+    """Return all of a few numbers, or the smallest and largest of many."""
     if len(values) > _MOST_NUMBERS:
         return f"{values[0]:.3g} to {values[-1]:.3g}"
     return " and ".join(f"{number:g}" for number in values)

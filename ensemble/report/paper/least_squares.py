@@ -29,6 +29,7 @@ class PowerLaw:
     error: float
 
     def __str__(self) -> str:
+        """Return the exponent with its error."""
         return f"{self.exponent:.3f} ± {self.error:.3f}".replace("-", "−")
 
 

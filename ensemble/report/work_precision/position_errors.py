@@ -25,8 +25,10 @@ def position_error(run: Run, membranes: Array) -> tuple[float, float]:
 
     Returns
     -------
-    rms, largest : float
-        Root mean square and maximum of the distance, over all points of the run.
+    rms : float
+        Root mean square of the distance, over all points of the run.
+    largest : float
+        Largest distance.
     """
     distances = np.concatenate(
         [shape_distance(points, other) for points, other in zip(final_membranes(run), membranes, strict=True)]

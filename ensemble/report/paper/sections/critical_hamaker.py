@@ -201,8 +201,10 @@ def lines_through(brackets: Mapping[float, Interval]) -> tuple[Interval, Interva
 
     Returns
     -------
-    intercepts, slopes : (float, float)
-        Least and greatest value.
+    intercepts : (float, float)
+        Least and greatest intercept.
+    slopes : (float, float)
+        Least and greatest slope.
     """
     ends = np.array(list(brackets.values()))
     line = np.stack([np.ones(len(ends)), list(brackets)], axis=1)

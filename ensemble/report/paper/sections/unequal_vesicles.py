@@ -146,7 +146,9 @@ def contact_fractions(run: Run) -> tuple[float, float]:
 
     Returns
     -------
-    first, second : float
+    first : float
+        Between 0 and 1.
+    second : float
         Between 0 and 1.
     """
     assert run.scene.adhesion

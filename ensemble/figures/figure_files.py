@@ -1,4 +1,4 @@
-"""Writing a figure to a file."""
+"""Figures as files."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from ensemble.disk import replacing
 from ensemble.figures.style import STYLE
 
-# What a format would date its files with, blanked so that equal figures are equal files.
+# The metadata that hold the date of a file are left out, so that equal figures are equal files.
 _UNDATED = {".png": {}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
 
 FIGURE_SUFFIXES: Final = tuple(_UNDATED)
@@ -27,7 +27,7 @@ def save(figure: Figure, path: Path) -> None:
     ----------
     figure : Figure
     path : Path
-        Ends in ``.png``, ``.svg`` or ``.pdf``.
+        Its suffix is ``.png``, ``.svg`` or ``.pdf``.
 
     Raises
     ------
@@ -40,12 +40,23 @@ def save(figure: Figure, path: Path) -> None:
 
 
 def suffix_among(path: Path, suffixes: Sequence[str]) -> str:
-    """Return the suffix of a file, in lower case.
+    """Return the suffix of a file in lower case, and check it.
+
+    Parameters
+    ----------
+    path : Path
+    suffixes : sequence of str
+        The suffixes that are allowed, at least two.
+
+    Returns
+    -------
+    str
+        One of ``suffixes``.
 
     Raises
     ------
     ValueError
-        If it is not one of ``suffixes``.
+        If the suffix is not allowed.
     """
     suffix = path.suffix.lower()
     if suffix not in suffixes:
