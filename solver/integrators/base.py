@@ -1,11 +1,6 @@
 """What an integrator is given, what it does, and how it is registered.
 
-To add an integrator, write a module in this folder with a function that is registered here, and add its name
-to `solver.scene.numerics.INTEGRATORS`::
-
-    @register("midpoint")
-    def midpoint(problem: InitialValueProblem, numerics: Numerics) -> Integrator:
-        return ...
+`solver/README.md` says how to add one.
 """
 
 from __future__ import annotations

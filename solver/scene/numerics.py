@@ -14,16 +14,31 @@ INTEGRATORS = RegisteredNames("auto", "bdf", "rosenbrock", "sdc", "imex-euler")
 
 
 class Numerics(Model):
-    """Resolution in space and time."""
+    """Resolution in space and time.
 
-    # On each vesicle; "auto": as many as the tolerance needs, and more when a run comes to need them.
+    Attributes
+    ----------
+    points : int or "auto"
+        On each vesicle; "auto" for as many as the tolerance needs, and more when a run comes to need them.
+    tolerance : float
+        Estimated local error allowed in a step, absolute, of tangent angles (radians) and centers.
+    integrator : str
+        One of `INTEGRATORS`; "auto" for the fastest one.
+    order : int or None
+        Of "sdc"; None for its usual one.
+    step_control : str
+        "embedded" for the estimated error of each step; "area-length" for the drift of areas and lengths over
+        the run (Quaife & Biros 2016).
+    work_limit : int
+        Evaluations of the equation of motion after which a run is given up.
+    """
+
     points: Annotated[int, Field(ge=16, le=1024, multiple_of=2)] | Literal["auto"] = 64
-    tolerance: float = Field(1e-4, ge=1e-12, le=0.1)  # local error of tangent angle and center, absolute
+    tolerance: float = Field(1e-4, ge=1e-12, le=0.1)
     integrator: Annotated[str, INTEGRATORS] = "auto"
-    order: int | None = Field(None, ge=2, le=8)  # of "sdc"; None: its usual one
-    # By the estimated error of each step, or as the paper: by the drift of areas and lengths over the run.
+    order: int | None = Field(None, ge=2, le=8)
     step_control: Literal["embedded", "area-length"] = "embedded"
-    work_limit: int = Field(1_000_000, ge=1)  # evaluations after which a run is given up
+    work_limit: int = Field(1_000_000, ge=1)
 
     @model_validator(mode="after")
     def _options_of_the_integrator(self) -> Self:
