@@ -1,21 +1,98 @@
 """How the sums over points are compiled.
 
 Their inner loops are plain loops that LLVM turns into SIMD code.  This needs ``error_model="numpy"``, without
-which every division has a branch for zero.
+which every division has a branch for zero.  What is compiled is cached on disk for all processes.  The cache
+is a convenience: where it cannot be read or written, functions are compiled as if there were none.
 """
 
 from __future__ import annotations
 
-from functools import partial
+import hashlib
+import logging
+import pickle
+from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 from numba import njit, types
+from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.extending import intrinsic
 
 # Without "ninf" and "nnan": a run that diverges must show it.
-compiled = partial(
-    njit, cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz", "arcp"}
-)
+_FAST_MATH = {"reassoc", "contract", "nsz", "arcp"}
+
+_log = logging.getLogger(__name__)
+
+
+def compiled(function: Callable[..., Any] | None = None, **options: Any) -> Any:
+    """Compile a function with Numba when it is first called, and cache the result on disk.
+
+    Parameters
+    ----------
+    function : callable
+        The function.  Left out, a decorator is returned.
+    **options
+        Further options of `numba.njit`.
+    """
+    if function is None:
+        return lambda function: compiled(function, **options)
+    dispatcher = njit(nogil=True, error_model="numpy", fastmath=_FAST_MATH, **options)(function)
+    try:
+        dispatcher._cache = _ToleratedCache(function)
+    except RuntimeError as error:  # no directory can be written to
+        _say_once(str(error))
+    return dispatcher
+
+
+@cache
+def _say_once(reason: str) -> None:
+    _log.warning("compiled functions are not kept (%s); they are compiled anew by every process", reason)
+
+
+class _ToleratedCache(FunctionCache):
+    """Numba's cache, none of whose failures matters."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)
+        self._cache_file = _CheckedFiles(
+            cache_path=self._cache_path,
+            filename_base=self._impl.filename_base,
+            source_stamp=self._impl.locator.get_source_stamp(),
+        )
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        try:
+            return super().load_overload(sig, target_context)
+        except Exception:  # whatever a damaged file leads to; the function is compiled instead
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        try:
+            super().save_overload(sig, data)
+        except OSError as error:
+            _say_once(error.strerror or str(error))
+
+
+class _CheckedFiles(IndexDataCacheFile):
+    """The files of one function's cache.  Machine code is only run if it is what was written."""
+
+    def _load_index(self) -> Any:
+        try:
+            return super()._load_index()
+        except Exception:  # a torn or empty file; it is written anew
+            return {}
+
+    def _load_data(self, name: str) -> Any:
+        with open(self._data_path(name), "rb") as file:
+            digest, data = file.read(32), file.read()
+        if hashlib.sha256(data).digest() != digest:
+            raise OSError(f"{name} is damaged")
+        return pickle.loads(data)
+
+    def _save_data(self, name: str, data: Any) -> None:
+        pickled = self._dump(data)
+        with self._open_for_write(self._data_path(name)) as file:
+            file.write(hashlib.sha256(pickled).digest() + pickled)
 
 
 @intrinsic
