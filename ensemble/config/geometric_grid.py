@@ -23,7 +23,7 @@ class GeometricGrid:
     There are the fewest points per decade that bring neighbors closer than the tolerance:
     (high − low)/low < tolerance.
 
-    Parameters
+    Attributes
     ----------
     tolerance : float
         Relative distance that neighbors must stay below, > 0.

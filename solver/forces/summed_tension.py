@@ -24,7 +24,7 @@ _LIMIT = 100  # iterations; measured: 4 to 8 are usual
 class Preconditioner(NamedTuple):
     """What each vesicle's tension does to itself: `TensionInverse` of each vesicle by itself.
 
-    Parameters
+    Attributes
     ----------
     inverses : (M, N, N) array
     shifts : (M, 1) array

@@ -43,7 +43,7 @@ class Mobility(Protocol):
 class Inextensible(NamedTuple):
     """A motion that does not stretch the membranes.
 
-    Parameters
+    Attributes
     ----------
     tension : (M, N) array
         What achieves it.
@@ -61,7 +61,7 @@ class Inextensible(NamedTuple):
 class TensionInverse(NamedTuple):
     """The inverse of A in one geometry, which preconditions the search for the tension in others.
 
-    Parameters
+    Attributes
     ----------
     matrix : (M·N, M·N) array
         Weighted with the spacing.

@@ -70,7 +70,7 @@ class DifferentialEquation(Protocol):
 class InitialValueProblem:
     """What an integrator solves.
 
-    Parameters
+    Attributes
     ----------
     equation : DifferentialEquation
     state : (n,) array
@@ -91,7 +91,7 @@ class InitialValueProblem:
 class Step:
     """One accepted step.
 
-    Parameters
+    Attributes
     ----------
     start, end : float
     state : (n,) array

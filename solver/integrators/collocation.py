@@ -18,25 +18,30 @@ class GaussLobatto:
     """Gauss–Lobatto nodes on [0, 1]: both ends and the extrema of a Legendre polynomial.
 
     The quadrature over [0, 1] is exact to degree 2·count − 3, between neighboring nodes to count − 1.
+
+    Attributes
+    ----------
+    count : int
+        Number of nodes.
     """
 
     count: int
 
     @cached_property
     def nodes(self) -> Array:
-        """Nodes in ascending order, (count,)."""
+        """The nodes in ascending order, (count,)."""
         interior = roots_jacobi(self.count - 2, 1, 1)[0] if self.count > 2 else np.empty(0)
         nodes = (1 + np.concatenate([[-1.0], interior, [1.0]])) / 2
         return np.asarray((nodes + 1 - nodes[::-1]) / 2)  # symmetric to the last bit
 
     @cached_property
     def intervals(self) -> Array:
-        """Distances between neighboring nodes, (count − 1,)."""
+        """The distances between neighboring nodes, (count − 1,)."""
         return np.diff(self.nodes)
 
     @cached_property
     def integration(self) -> Array:
-        """Integrals between neighboring nodes from values at all nodes, (count − 1, count)."""
+        """The matrix of integrals between neighboring nodes from values at all nodes, (count − 1, count)."""
         abscissas, weights = np.polynomial.legendre.leggauss(self.count)
         basis = KroghInterpolator(self.nodes, np.eye(self.count))
         points = self.nodes[:-1, None] + self.intervals[:, None] * (1 + abscissas) / 2

@@ -11,12 +11,21 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-_SAFETY = 0.9  # aimed at below what is allowed, as a factor of the step size
-_SHRINK, _GROW = 0.2, 5.0  # limits of the change from one attempt to the next
+_SAFETY = 0.9  # factor of the step size that keeps the next error below what is allowed
+_SHRINK, _GROW = 0.2, 5.0  # limits of the factor from one attempt to the next
 
 
 def root_mean_square(values: Array) -> float:
-    """The norm in which states are compared."""
+    """Return the norm in which states are compared.
+
+    Parameters
+    ----------
+    values : (n,)
+
+    Returns
+    -------
+    float
+    """
     return float(np.sqrt(np.mean(values**2)))
 
 
@@ -24,10 +33,18 @@ def root_mean_square(values: Array) -> float:
 class Attempt:
     """A step that was tried.
 
-    before, after : (state_size,), the states at its ends.
-    estimate : (state_size,), the embedded estimate of the error of ``after``.
-    interpolate : maps a fraction of the step, in [0, 1], to the state there.
-    slope : the rate in ``after``, None where the method does not come to it.
+    Attributes
+    ----------
+    size : float
+        Its duration.
+    before, after : (n,)
+        States at its ends.
+    estimate : (n,)
+        Embedded estimate of the error of ``after``.
+    interpolate : callable
+        From a fraction of the step, in [0, 1], to the state there.
+    slope : (n,) or None
+        Rate in ``after``; None if the method does not compute it.
     """
 
     size: float
@@ -40,7 +57,15 @@ class Attempt:
 
 @dataclass(frozen=True)
 class StepDecision:
-    """What becomes of an attempt: the size of the next one, and why this one is rejected, if it is."""
+    """Whether an attempt is accepted, and how long the next one is.
+
+    Attributes
+    ----------
+    size : float
+        Duration of the next attempt.
+    rejection : str or None
+        Why this one is rejected; None if it is accepted.
+    """
 
     size: float
     rejection: str | None = None
@@ -50,27 +75,81 @@ class StepControl(Protocol):
     """Chooses step sizes."""
 
     def first_size(self, acceleration: Array) -> float:
-        """Size to begin with, given the second derivative of the state in time, (state_size,)."""
+        """Return the size of the first attempt.
+
+        Parameters
+        ----------
+        acceleration : (n,)
+            Second derivative of the state in time.
+
+        Returns
+        -------
+        float
+        """
 
     def judge(self, attempt: Attempt) -> StepDecision:
-        """Accept or reject a finite attempt."""
+        """Accept or reject a finite attempt.
+
+        Parameters
+        ----------
+        attempt : Attempt
+
+        Returns
+        -------
+        StepDecision
+        """
 
     def reject(self, size: float, reason: str) -> StepDecision:
-        """Reject an attempt of this size that has no finite result."""
+        """Reject an attempt that has no finite result.
+
+        Parameters
+        ----------
+        size : float
+            Of the attempt.
+        reason : str
+
+        Returns
+        -------
+        StepDecision
+        """
 
 
 class ErrorMeasure(Protocol):
-    """Compares the error of an attempt with what is allowed."""
+    """Compares the error of an attempt with what is allowed.
 
-    name: str  # of the error
-    power: int  # the excess grows as this power of the step size
+    Attributes
+    ----------
+    name : str
+        Of the error, for messages.
+    power : int
+        The excess grows as this power of the step size.
+    """
+
+    name: str
+    power: int
 
     def excess(self, attempt: Attempt) -> float:
-        """Error as a multiple of what is allowed."""
+        """Return the error as a multiple of what is allowed.
+
+        Parameters
+        ----------
+        attempt : Attempt
+
+        Returns
+        -------
+        float
+        """
 
 
 class EmbeddedError:
-    """The embedded estimate, which grows as ``power`` of the step size, against a tolerance on every step."""
+    """Compares the embedded estimate with a tolerance on every step.
+
+    Parameters
+    ----------
+    tolerance : float
+    power : int
+        The estimate grows as this power of the step size.
+    """
 
     name = "estimated error"
 
@@ -79,23 +158,33 @@ class EmbeddedError:
         self._tolerance = tolerance
 
     def excess(self, attempt: Attempt) -> float:
-        """See `ErrorMeasure`."""
+        """Return the estimate over the tolerance.
+
+        Parameters
+        ----------
+        attempt : Attempt
+
+        Returns
+        -------
+        float
+        """
         return root_mean_square(attempt.estimate) / self._tolerance
 
 
 class ConservedError:
-    """The drift of conserved quantities against the step's share of a tolerance on the whole run.
+    """Compares the drift of conserved quantities with the step's share of a tolerance on the whole run.
 
-    Quaife & Biros, Adaptive time stepping for vesicle suspensions, J. Comput. Phys. 306 (2016), with areas
-    and lengths as the quantities.  Blind to errors that conserve them all; and where the discretization in
-    space does not conserve them well enough, no step is small enough.
+    Areas and lengths are the quantities in (Quaife & Biros 2016).  Errors that conserve them all pass
+    unnoticed.  Where the discretization in space does not conserve them well enough, no step is small enough.
 
     Parameters
     ----------
     quantities : callable
-        From a state (state_size,) to conserved quantities of order 1.
+        From a state (n,) to conserved quantities of order 1.
     tolerance : float
-        Their drift over ``duration``.
+        Drift allowed over ``duration``.
+    duration : float
+        Of the run.
     order : int
         Of the method.
     """
@@ -110,15 +199,28 @@ class ConservedError:
         self._allowed_rate = tolerance / duration
 
     def excess(self, attempt: Attempt) -> float:
-        """See `ErrorMeasure`."""
+        """Return the largest drift over the one that is allowed.
+
+        Parameters
+        ----------
+        attempt : Attempt
+
+        Returns
+        -------
+        float
+        """
         drift = np.abs(self._quantities(attempt.after) - self._quantities(attempt.before)).max()
         return float(drift) / (self._allowed_rate * attempt.size)
 
 
 class AdaptiveStep:
-    """Step sizes from a measured error that is allowed to be 1, with no growth right after a rejection.
+    """Chooses step sizes from a measured error, with no growth right after a rejection.
 
-    ``first_error`` (root mean square of the state) is what Euler's method would make in the first step.
+    Parameters
+    ----------
+    measure : ErrorMeasure
+    first_error : float
+        Error, root mean square of the state, that Euler's method would make in the first step.
     """
 
     def __init__(self, measure: ErrorMeasure, first_error: float) -> None:
@@ -127,12 +229,31 @@ class AdaptiveStep:
         self._may_grow = True
 
     def first_size(self, acceleration: Array) -> float:
-        """See `StepControl`."""
+        """Return the size of the first attempt.
+
+        Parameters
+        ----------
+        acceleration : (n,)
+            Second derivative of the state in time.
+
+        Returns
+        -------
+        float
+        """
         typical = root_mean_square(acceleration)
         return float(np.sqrt(2 * self._first_error / typical)) if typical > 0 else np.inf
 
     def judge(self, attempt: Attempt) -> StepDecision:
-        """See `StepControl`."""
+        """Accept an attempt whose error is allowed, and choose the next size from the error.
+
+        Parameters
+        ----------
+        attempt : Attempt
+
+        Returns
+        -------
+        StepDecision
+        """
         excess = self._measure.excess(attempt)
         if not np.isfinite(excess):
             return self.reject(attempt.size, f"the {self._measure.name} is not finite")
@@ -146,6 +267,17 @@ class AdaptiveStep:
         return StepDecision(attempt.size * min(max(factor, _SHRINK), limit))
 
     def reject(self, size: float, reason: str) -> StepDecision:
-        """See `StepControl`."""
+        """Reject an attempt that has no finite result.
+
+        Parameters
+        ----------
+        size : float
+            Of the attempt.
+        reason : str
+
+        Returns
+        -------
+        StepDecision
+        """
         self._may_grow = False
         return StepDecision(size * _SHRINK, reason)

@@ -1,7 +1,6 @@
 """Coefficients of Rodas5P, a stiffly accurate, L-stable Rosenbrock method of order 5 with 8 stages.
 
-Steinebach, Construction of Rosenbrock–Wanner method Rodas5P and numerical benchmarks within the Julia
-Differential Equations package, BIT 63 (2023): it keeps order 4 or more on stiff parabolic problems.
+It keeps order 4 or more on stiff parabolic problems (Steinebach 2023).
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Rosenbrock–Wanner methods: linearly implicit Runge–Kutta formulas with the exact Jacobian.
 
-Hairer & Wanner, Solving Ordinary Differential Equations II, section IV.7.
+See (Hairer & Wanner 1996, section IV.7).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Tableau:
-    """Coefficients, in the form that needs no product with the Jacobian.
+    """Coefficients, in the form that needs no product with the Jacobian (Hairer & Wanner 1996, section IV.7).
 
     With step size h, Jacobian J and increments kᵢ of the stages,
 
@@ -28,11 +28,18 @@ class Tableau:
 
         y(τ) = (1 − τ) y₀ + τ (y₁ + (1 − τ) (d₁ + τ d₂ + τ² d₃ + …)),    dₘ = Σⱼ dₘⱼ kⱼ.
 
-    order : of y₁; that of the estimate is the same, one more than of what it estimates
-    diagonal : γ
-    stage : a, strictly lower triangular, (stages, stages)
-    coupling : c, the same
-    dense : d, (·, stages)
+    Attributes
+    ----------
+    order : int
+        Of y₁.  The estimate grows as this power of the step size.
+    diagonal : float
+        The coefficient γ.
+    stage : (stages, stages)
+        The coefficients a, strictly lower triangular.
+    coupling : (stages, stages)
+        The coefficients c, strictly lower triangular.
+    dense : (·, stages)
+        The coefficients d.
     """
 
     order: int
@@ -43,30 +50,47 @@ class Tableau:
 
 
 class Rosenbrock:
-    """A stiffly accurate Rosenbrock–Wanner method."""
+    """A stiffly accurate Rosenbrock–Wanner method.
+
+    Parameters
+    ----------
+    tableau : Tableau
+    """
 
     def __init__(self, tableau: Tableau) -> None:
         self._tableau = tableau
 
     def attempt(self, near: Linearization, size: float) -> Attempt:
-        """See `OneStepMethod`."""
+        """Try a step, see `OneStepMethod`.
+
+        Parameters
+        ----------
+        near : Linearization
+            Where the step begins.
+        size : float
+            Its duration.
+
+        Returns
+        -------
+        Attempt
+        """
         tableau = self._tableau
         solve = near.solver(tableau.diagonal * size)
         increments = np.empty((len(tableau.stage), len(near.state)))
         value, slope = near.state, near.slope
         for stage in range(len(increments)):
-            found = increments[:stage]
+            earlier = increments[:stage]
             if stage > 0:
-                value = near.state + tableau.stage[stage, :stage] @ found
+                value = near.state + tableau.stage[stage, :stage] @ earlier
                 slope = near.rate(value)
-            right = size * slope + tableau.coupling[stage, :stage] @ found
+            right = size * slope + tableau.coupling[stage, :stage] @ earlier
             increments[stage] = solve(tableau.diagonal * right)
         after = value + increments[-1]
-        bends = tableau.dense @ increments
+        coefficients = tableau.dense @ increments
 
         def interpolate(fraction: float) -> Array:
-            bend = np.polynomial.polynomial.polyval(fraction, bends)
-            inner = (1 - fraction) * near.state + fraction * (after + (1 - fraction) * bend)
+            correction = np.polynomial.polynomial.polyval(fraction, coefficients)
+            inner = (1 - fraction) * near.state + fraction * (after + (1 - fraction) * correction)
             return np.asarray(inner)
 
         return Attempt(

@@ -1,11 +1,11 @@
 """Spectral deferred correction with linearly implicit Euler sweeps.
 
-Dutt, Greengard & Rokhlin, BIT 40 (2000); Minion, Commun. Math. Sci. 1 (2003); for vesicles Quaife & Biros,
-J. Comput. Phys. 306 (2016).  The rate is split as f(y) = J y + (f(y) − J y), the first part implicit and the
-second explicit, with J the Jacobian at the start of the step.  All of f is in the residual, so each sweep
-raises the order by one however exact J is; only in modes much faster than the step it merely divides the
-error by some factor.  (Sweeps with the LU factors of the quadrature would divide it by more, but no longer
-damp these modes: Lobatto's formula does not.)
+The method is that of (Dutt, Greengard & Rokhlin 2000), with implicit and explicit parts as in (Minion 2003)
+and for vesicles as in (Quaife & Biros 2016).  The rate is split as f(y) = J y + (f(y) − J y), with the
+Jacobian J at the start of the step.  The first part is implicit and the second explicit.  All of f is in the
+residual, so each sweep raises the order by one however exact J is.  Only in modes much faster than the step a
+sweep merely divides the error by some factor.  Sweeps with the LU factors of the quadrature would divide it
+by more, but would no longer damp these modes, because Lobatto's formula does not.
 """
 
 from __future__ import annotations
@@ -27,15 +27,35 @@ _USUAL_ORDER = 4
 
 
 def node_count(order: int) -> int:
-    """Number of Gauss–Lobatto nodes for an order: the polynomial through their values has the order too."""
+    """Return the number of Gauss–Lobatto nodes: the polynomial through the values there has the order too.
+
+    Parameters
+    ----------
+    order : int
+        Of the method.
+
+    Returns
+    -------
+    int
+    """
     return max(order, 2)
 
 
 def estimate_power(order: int) -> int:
-    """The power of the step size as which the embedded estimate grows.
+    """Return the power of the step size as which the embedded estimate grows.
 
-    It is what the last sweep changes, so the error of one order less; order 1 has a sweep for it alone.  The
-    error of the quadrature, of far higher order, is not in it: a rate that depends on time alone would pass.
+    The estimate is the change by the last sweep, which is the error of one order less; order 1 has a sweep
+    for it alone.  The error of the quadrature, of far higher order, is not included: the estimate of a rate
+    that depends on time alone would be zero.
+
+    Parameters
+    ----------
+    order : int
+        Of the method.
+
+    Returns
+    -------
+    int
     """
     return max(order, 2)
 
@@ -93,7 +113,19 @@ class DeferredCorrection:
         self._rule = GaussLobatto(node_count(order))
 
     def attempt(self, near: Linearization, size: float) -> Attempt:
-        """See `OneStepMethod`."""
+        """Try a step, see `OneStepMethod`.
+
+        Parameters
+        ----------
+        near : Linearization
+            Where the step begins.
+        size : float
+            Its duration.
+
+        Returns
+        -------
+        Attempt
+        """
         sweeps = _Sweeps(near, size, self._rule)
         values, slopes = sweeps.predict()
         for _ in range(max(self._order - 1, 1)):

@@ -53,7 +53,7 @@ def accuracy_of(numerics: Numerics) -> float:
 class Motion:
     """Velocity, tension and forces in one state of M vesicles with N points each.
 
-    Parameters
+    Attributes
     ----------
     geometry : Geometry
         Points and tangents in this state.

@@ -52,7 +52,7 @@ class Jacobian(Protocol):
 class DenseJacobian:
     """A Jacobian as a matrix.
 
-    Parameters
+    Attributes
     ----------
     matrix : (n, n) array
     """
@@ -94,7 +94,7 @@ class DenseJacobian:
 class BlockDiagonal:
     """An approximate Jacobian without what the parts of a state do to each other.
 
-    Parameters
+    Attributes
     ----------
     blocks : (m, n, n) array
         One dense block for each of the m parts that are this rank's.
