@@ -21,7 +21,8 @@ from tests.solver.suspensions import suspension
 Array = NDArray[np.float64]
 Form = Callable[[Scene], EquationOfMotion]
 
-PAIR = uneven_pair(flow=Shear(rate=0.5), numerics=Numerics(points=32, tolerance=1e-4))
+PAIR = uneven_pair(flow=Shear(rate=0.5), numerics=Numerics(points=32, tolerance=1e-9))
+CONTRASTS = with_contrasts(PAIR, 3.0, 0.5).model_copy(update={"numerics": Numerics(points=32)})
 
 
 def summed(scene: Scene) -> EquationOfMotion:
@@ -32,7 +33,7 @@ every_form = pytest.mark.parametrize(
     ("form", "scene", "far"),
     [
         (DenseEquation.of, PAIR, 3.0),
-        (DenseEquation.of, with_contrasts(PAIR, 3.0, 0.5), 1.5),
+        (DenseEquation.of, CONTRASTS, 1.5),
         (summed, suspension(8), 1.0),
     ],
     ids=["dense", "contrast", "summed"],
