@@ -62,7 +62,8 @@ class Groups:
     @property
     def parallel(self) -> Parallel:
         """How this rank's group computes a run."""
-        from solver.parallel import SERIAL, Ranks
+        from ensemble.mpi.ranks import Ranks
+        from solver.parallel import SERIAL
 
         return Ranks(self.group) if self.group.Get_size() > 1 else SERIAL
 

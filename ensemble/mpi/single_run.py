@@ -97,7 +97,8 @@ def single_run(
 
 def _together(communicator: Intracomm | None, ranks: int) -> Parallel | None:
     """The first ranks of a communicator, which compute the run; None on the others."""
-    from solver.parallel import SERIAL, Ranks
+    from ensemble.mpi.ranks import Ranks
+    from solver.parallel import SERIAL
 
     if communicator is None:
         return SERIAL

@@ -21,8 +21,9 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from ensemble.mpi.ranks import Ranks
 from solver.motion.form import equation_of_motion
-from solver.parallel import SERIAL, Parallel, Ranks
+from solver.parallel import SERIAL, Parallel
 from solver.scene import Scene
 from solver.simulation.initial_state import initial_ellipses
 from solver.simulation.simulate import simulate

@@ -1,4 +1,4 @@
-"""What `test_parallel` runs under a launcher: the same computations on however many ranks, saved by each."""
+"""What `test_ranks` runs under a launcher: the same computations on however many ranks, saved by each."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ensemble.mpi.ranks import Ranks
 from ensemble.mpi.world import abort_guard, world
 from solver.analysis.run import Run
 from solver.motion.dense import DenseEquation
 from solver.motion.summed import SummedEquation
-from solver.parallel import SERIAL, Parallel, Ranks
+from solver.parallel import SERIAL, Parallel
 from solver.scene import LARGEST_DENSE, Adhesion, Numerics, Scene, Shear, Trap, Vesicle
 from solver.simulation.initial_state import initial_ellipses
 from solver.simulation.simulate import simulate
