@@ -37,7 +37,7 @@ class Preconditioner(NamedTuple):
 
 @compiled
 def _image(tangents: Array, shifts: Array, tension: Array, gradient: Array) -> Array:
-    """The mean of each tension (m, N) times its shift, minus the stretching in its velocity gradient."""
+    """Return the mean of each tension (m, N) times its shift, minus the stretching of its velocity."""
     image = np.empty_like(tension)
     for vesicle in range(tension.shape[0]):
         shift = shifts[vesicle, 0] * tension[vesicle].mean()

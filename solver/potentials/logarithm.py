@@ -35,7 +35,7 @@ _A0 = 2.0 / LOGARITHM_UNIT
 
 @intrinsic
 def _bits_of(typing_context: Any, value: Any) -> Any:
-    """The 64 bits of a double, as an integer."""
+    """Return the 64 bits of a double as an integer."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return builder.bitcast(arguments[0], ir.IntType(64))
@@ -45,7 +45,7 @@ def _bits_of(typing_context: Any, value: Any) -> Any:
 
 @intrinsic
 def _double_of(typing_context: Any, bits: Any) -> Any:
-    """The double with these 64 bits."""
+    """Return the double with these 64 bits."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return builder.bitcast(arguments[0], ir.DoubleType())
