@@ -1,4 +1,4 @@
-"""Databases, queues and services to test with."""
+"""Fixtures: stores, databases, queues, and clients of services."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def store(tmp_path: Path) -> Path:
 
 @pytest.fixture(params=["sqlite", "postgresql"])
 def database_url(request: pytest.FixtureRequest, store: Path) -> str:
-    """URL of an empty database, of every kind that there is."""
+    """URL of an empty database, on SQLite and on PostgreSQL."""
     if request.param == "sqlite":
         return Settings(store=store).database_url
     server: postgresql.Server = request.getfixturevalue("postgresql_server")
@@ -49,19 +49,19 @@ def jobs(database: Database, store: Path) -> Jobs:
 
 @pytest.fixture(scope="session")
 def filled_store(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A store of runs and a boundary; tests only read it."""
+    """A store with runs and a boundary; tests only read it."""
     return fill(tmp_path_factory.mktemp("filled") / "store")
 
 
 @pytest.fixture(scope="session")
 def reading(filled_store: Path) -> Iterator[httpx.Client]:
-    """Talks to a service of the filled store; tests only read."""
+    """A client of a service of the filled store; tests only read."""
     with client_of(filled_store) as client:
         yield client
 
 
 @pytest.fixture
 def submitting(store: Path) -> Iterator[httpx.Client]:
-    """Talks to a service of an empty store, whose jobs nobody carries out."""
+    """A client of a service of an empty store without workers."""
     with client_of(store) as client:
         yield client

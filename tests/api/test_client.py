@@ -36,21 +36,21 @@ def reader(filled_store: Path) -> Iterator[Client]:
 
 @pytest.fixture
 def submitter(tmp_path: Path) -> Iterator[Client]:
-    """A client of a new store, whose jobs nobody runs."""
+    """A client of a new store without workers."""
     with serving(tmp_path / "store") as url, Client(url) as client:
         yield client
 
 
 def test_a_submitted_scene_is_waited_for_and_read(tmp_path: Path) -> None:
     store = tmp_path / "store"
-    seen: list[Job] = []
+    states: list[Job] = []
     with serving(store) as url, working(store), Client(url) as client:
-        job = client.wait(client.submit("doublet-shear", SHORT), seen.append)
+        job = client.wait(client.submit("doublet-shear", SHORT), states.append)
         run = client.run(job.key)
         data = run.to_xarray()
     assert job.status is JobStatus.SUCCEEDED
-    assert seen[-1] == job
-    assert [event.progress for event in seen] == sorted(event.progress for event in seen)
+    assert states[-1] == job
+    assert [state.progress for state in states] == sorted(state.progress for state in states)
     with Store.existing(store) as opened:
         stored = opened.load(job.key)
     assert run.summary.outcome == stored.outcome == Outcome.UNDECIDED
@@ -101,7 +101,7 @@ def test_a_collection_longer_than_a_page(submitter: Client) -> None:
     assert [job.id for job in submitter.jobs()] == submitted[::-1]
 
 
-def test_a_study_or_scene_of_ones_own(submitter: Client) -> None:
+def test_studies_and_scenes_are_submitted_as_models(submitter: Client) -> None:
     study, scene = load_study("critical-hamaker"), load_scene("doublet-trap")
     assert submitter.submit(study).key == study.key
     assert submitter.submit(scene).name == "scene"
@@ -109,14 +109,14 @@ def test_a_study_or_scene_of_ones_own(submitter: Client) -> None:
     assert submitter.estimate(study, {"sweep.values": [0.5]}).runs < submitter.estimate(study).runs
 
 
-def test_what_the_service_refuses_names_the_field(submitter: Client) -> None:
+def test_a_refusal_names_the_field(submitter: Client) -> None:
     with pytest.raises(Refused, match=r"numerics\.points: 31") as refusal:
         submitter.submit("doublet-shear", {"numerics.points": 31})
     assert refusal.value.status == 422
     assert not list(submitter.jobs())
 
 
-def test_a_dismissed_job_is_waited_for_no_longer(submitter: Client) -> None:
+def test_waiting_ends_when_the_job_is_dismissed(submitter: Client) -> None:
     job = submitter.submit("doublet-shear")
     timer = threading.Timer(0.3, lambda: submitter.dismiss(job))
     timer.start()
@@ -124,7 +124,7 @@ def test_a_dismissed_job_is_waited_for_no_longer(submitter: Client) -> None:
     timer.join()
 
 
-def test_a_token_opens_a_service_that_asks_for_one(tmp_path: Path) -> None:
+def test_a_client_with_a_token(tmp_path: Path) -> None:
     store = tmp_path / "store"
     Store.open(store).close()
     token = make_token(store, "ada", TokenScope.SUBMIT, timedelta(hours=1))
@@ -138,7 +138,7 @@ def test_a_token_opens_a_service_that_asks_for_one(tmp_path: Path) -> None:
 
 @contextmanager
 def losing_the_first_answer(port: int) -> Iterator[str]:
-    """Pass requests on to a port of this machine, and drop the connection when the first answer comes."""
+    """Forward requests to a port of this machine, and drop the connection when the first answer arrives."""
     lost = threading.Event()
 
     def carry(client: socket.socket) -> None:
@@ -178,7 +178,7 @@ def test_a_request_whose_answer_is_lost_makes_one_job(tmp_path: Path) -> None:
         assert [known.id for known in direct.jobs()] == [job.id]
 
 
-def test_waiting_goes_on_when_the_service_is_killed_and_started_anew(tmp_path: Path) -> None:
+def test_waiting_continues_when_the_service_is_killed_and_restarted(tmp_path: Path) -> None:
     store = tmp_path / "store"
     first = start_service(store, "--workers=0")
     with Client(first.url) as client:

@@ -1,4 +1,4 @@
-"""The page, in a real browser, before a real service with a worker."""
+"""The web page in a real browser, with a real service and a worker."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ VIEWS = {
     "/#/jobs": "Jobs",
     "/#/new?preset=doublet-shear": "New job",
 }
-# Remembers what the Content-Security-Policy has blocked.
+# Records what the Content-Security-Policy blocks.
 RECORD_VIOLATIONS = """
 window.violations = [];
 document.addEventListener("securitypolicyviolation", ({ effectiveDirective, blockedURI, sourceFile }) =>
@@ -71,7 +71,7 @@ def url(store: Path) -> Iterator[str]:
 
 @pytest.fixture(scope="module")
 def boundary(finished_study: Any) -> str:
-    """Address of the boundary, from that of the service."""
+    """Address of the boundary, relative to that of the service."""
     with Store.existing(finished_study.store) as opened:
         return f"/#/boundaries/{opened.boundaries()[0].study_key}"
 
@@ -84,7 +84,7 @@ def run_path(run: Run) -> str:
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
     with sync_playwright() as playwright:
-        # Without one on the system, the one that playwright has installed.
+        # If the system has none, the one that playwright has installed.
         chromium = playwright.chromium.launch(executable_path=shutil.which("chromium"))
         yield chromium
         chromium.close()
@@ -102,19 +102,19 @@ def page(browser: Browser) -> Iterator[Page]:
 
 
 def count(page: Page, outcome: str) -> int:
-    """How many marks the diagram has for an outcome."""
+    """Return the number of marks of an outcome in the diagram."""
     traces = page.locator(".diagram").evaluate("plot => plot.data")
     return sum(len(trace["x"]) for trace in traces if trace.get("name") == outcome)
 
 
 def widths(page: Page) -> list[float]:
-    """Widths of the brackets that are drawn."""
+    """Return the widths of the drawn brackets."""
     traces = page.locator(".diagram").evaluate("plot => plot.data")
     return [2 * half for trace in traces for half in trace.get("error_y", {}).get("array", [])]
 
 
 def picture(page: Page) -> str:
-    """What the player's canvas shows."""
+    """Return the image on the player's canvas."""
     return str(page.locator(".player canvas").evaluate("canvas => canvas.toDataURL()"))
 
 
@@ -123,13 +123,13 @@ def clock(page: Page) -> float:
 
 
 def across(page: Page) -> float:
-    """Where the line in the plots stands."""
+    """Return the horizontal position of the line in the plots."""
     box = page.locator(".cursor").bounding_box()
     assert box is not None
     return box["x"]
 
 
-def test_a_study_is_submitted_and_its_brackets_close_before_ones_eyes(page: Page, url: str) -> None:
+def test_a_submitted_study_is_shown_while_its_brackets_close(page: Page, url: str) -> None:
     page.goto(f"{url}/#/new?preset=critical-hamaker")
     expect(page.get_by_text("At most 66 runs")).to_be_visible()
     page.get_by_label("points on each vesicle").fill("31")
@@ -154,7 +154,7 @@ def test_a_study_is_submitted_and_its_brackets_close_before_ones_eyes(page: Page
     last = widths(page)
     assert len(last) == 1
     assert max(max(each) for each in drawn if each) > 1.5 * max(last)
-    # What the page has drawn is what the service says.
+    # The page shows what the service answers.
     job = httpx.get(f"{url}/jobs").json()["items"][0]
     points = httpx.get(f"{url}/boundaries/{job['key']}").json()["points"]
     assert sorted(last) == pytest.approx(
@@ -175,7 +175,7 @@ def test_a_mark_in_the_diagram_leads_to_its_run(page: Page, url: str, boundary: 
     expect(page.get_by_role("heading", level=1)).to_contain_text(Outcome.BOUND)
 
 
-def test_the_name_of_a_study_is_text_whatever_it_holds(page: Page, url: str, store: Path) -> None:
+def test_the_name_of_a_study_is_not_interpreted_as_html(page: Page, url: str, store: Path) -> None:
     study = load_study("critical-hamaker")
     name = "<img src=x onerror=alert(1)>"
     traced = Boundary(
@@ -188,7 +188,7 @@ def test_the_name_of_a_study_is_text_whatever_it_holds(page: Page, url: str, sto
     assert page.locator("main img").count() == 0
 
 
-def test_a_run_is_played_and_everything_moves_together(page: Page, url: str, run_path: str, run: Run) -> None:
+def test_a_run_is_played_with_canvas_and_plots_in_step(page: Page, url: str, run_path: str, run: Run) -> None:
     page.goto(url + run_path)
     page.locator(".histories .main-svg").first.wait_for()
     start = picture(page)
@@ -261,7 +261,7 @@ def test_the_flow_is_known_between_and_beyond_the_places_where_it_was_sampled(
     np.testing.assert_allclose(np.transpose(answer), expected, atol=1e-12)
 
 
-def test_a_long_run_comes_in_several_answers(page: Page, url: str, run: Run) -> None:
+def test_a_long_run_is_fetched_in_several_requests(page: Page, url: str, run: Run) -> None:
     page.goto(url)
     summary = httpx.get(f"{url}/runs/{run_key(run.scene)}").json()
     frames = """async ([run, most]) => {
@@ -301,7 +301,7 @@ def test_a_job_is_canceled(page: Page, url: str) -> None:
     assert httpx.get(f"{url}/jobs/{job['id']}").json()["status"] == "dismissed"
 
 
-def test_a_critical_value_is_read_off(page: Page, url: str, boundary: str, finished_study: Any) -> None:
+def test_a_critical_value_is_read(page: Page, url: str, boundary: str, finished_study: Any) -> None:
     expected = finished_study.document["boundary"][1]["critical_value"]
     page.goto(url + boundary)
     page.get_by_label("At shear rate").fill("0.75")
@@ -326,7 +326,7 @@ def test_runs_are_filtered(page: Page, url: str, store: Path) -> None:
     expect(page.get_by_role("alert")).to_contain_text("flow.speed")
 
 
-def test_a_token_is_asked_for_where_one_is_needed(page: Page, store: Path, tmp_path: Path) -> None:
+def test_the_page_asks_for_a_token_if_one_is_required(page: Page, store: Path, tmp_path: Path) -> None:
     guarded = Path(shutil.copytree(store, tmp_path / "store"))
     token = make_token(guarded, "ada", TokenScope.READ, timedelta(hours=1))
     with serving(guarded) as url:

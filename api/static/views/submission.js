@@ -9,14 +9,14 @@ import { alertAbout, messageOf } from "../problems.js";
 import { goTo } from "../router.js";
 
 /**
- * @typedef {object} Template - What is submitted apart from the changes.
+ * @typedef {object} Template - What the form submits, apart from the changes.
  * @property {string} title
  * @property {any} document
  * @property {{preset: string} | {scene: any}} origin
  */
 
 const USUAL_PRESET = "critical-hamaker";
-const QUIET_MILLISECONDS = 250; // without a key pressed, before the cost is asked for
+const QUIET_MILLISECONDS = 250; // without a change, before the cost is requested
 
 /** @param {import("../router.js").Place} place */
 export async function showSubmission({ content, query, signal }) {
@@ -92,8 +92,21 @@ function contents({ vesicles, arrangement, flow }) {
   return `${count === 1 ? "1 vesicle" : `${count} vesicles`}, ${flow ? flow.kind : "at rest"}`;
 }
 
+/** @param {string} id - Also the name of the limit in the document that is sent. */
+function limitInput(id) {
+  return element("input", { id, type: "number", min: 1, placeholder: "default of the service" });
+}
+
+/**
+ * @param {string} label
+ * @param {HTMLInputElement} input
+ */
+function labeled(label, input) {
+  return element("div", { class: "field" }, element("label", { for: input.id }, label), input);
+}
+
 class SubmissionForm {
-  /** The same for every attempt of this form, so that a repeated request makes one job. */
+  /** The same until the form changes, so that a repeated request makes one job. */
   #idempotencyKey = crypto.randomUUID();
   /** @type {number | undefined} */
   #timer;
@@ -107,23 +120,10 @@ class SubmissionForm {
     this.signal = signal;
     this.inputs = fieldsOf(template.document).map((field) => new FieldInput(field));
     this.further = new FurtherChanges();
-    this.ranks = element("input", {
-      id: "ranks",
-      type: "number",
-      min: 1,
-      placeholder: "as the service sees fit",
-    });
-    this.seconds = element("input", {
-      id: "seconds",
-      type: "number",
-      min: 1,
-      placeholder: "as the service sees fit",
-    });
+    this.ranks = limitInput("ranks");
+    this.seconds = limitInput("seconds");
     this.cost = element("p", { class: "cost", role: "status" });
     this.submit = element("button", { class: "primary" }, "Submit");
-    const [principal, others] = [true, false].map((wanted) =>
-      this.inputs.filter((input) => input.field.isPrincipal === wanted).map((input) => input.element),
-    );
     this.element = element(
       "form",
       {
@@ -133,6 +133,25 @@ class SubmissionForm {
         oninput: () => this.#onInput(),
       },
       element("h2", {}, template.title),
+      ...this.#parameters(),
+      element(
+        "div",
+        { class: "fields" },
+        labeled("ranks (processes)", this.ranks),
+        labeled("time limit in seconds", this.seconds),
+      ),
+      element("div", { class: "commit" }, this.cost, this.submit),
+    );
+    signal.addEventListener("abort", () => window.clearTimeout(this.#timer));
+    void this.#estimate();
+  }
+
+  /** The inputs of the fields: the principal ones, and all others in a part that is closed at first. */
+  #parameters() {
+    const [principal, others] = [true, false].map((wanted) =>
+      this.inputs.filter((input) => input.field.isPrincipal === wanted).map((input) => input.element),
+    );
+    return [
       element("div", { class: "fields" }, ...principal),
       element(
         "details",
@@ -141,29 +160,10 @@ class SubmissionForm {
         element("div", { class: "fields" }, ...others),
         this.further.element,
       ),
-      element(
-        "div",
-        { class: "fields" },
-        element(
-          "div",
-          { class: "field" },
-          element("label", { for: "ranks" }, "ranks (processes)"),
-          this.ranks,
-        ),
-        element(
-          "div",
-          { class: "field" },
-          element("label", { for: "seconds" }, "time limit in seconds"),
-          this.seconds,
-        ),
-      ),
-      element("div", { class: "commit" }, this.cost, this.submit),
-    );
-    signal.addEventListener("abort", () => window.clearTimeout(this.#timer));
-    void this.#estimate();
+    ];
   }
 
-  /** The document that is sent. */
+  /** The document to send. */
   get submission() {
     const changed = this.inputs
       .filter((input) => input.isChanged)
@@ -182,14 +182,14 @@ class SubmissionForm {
   }
 
   async #estimate() {
-    const asked = JSON.stringify(this.submission);
+    const requested = JSON.stringify(this.submission);
     try {
       const estimate = await post("/estimate", this.submission, { signal: this.signal });
-      if (asked === JSON.stringify(this.submission)) {
+      if (requested === JSON.stringify(this.submission)) {
         this.#showCost(estimate);
       }
     } catch (error) {
-      if (!this.signal.aborted && asked === JSON.stringify(this.submission)) {
+      if (!this.signal.aborted && requested === JSON.stringify(this.submission)) {
         this.#refuse(error);
       }
     }
@@ -212,7 +212,7 @@ class SubmissionForm {
   }
 
   /**
-   * Mark the inputs whose paths a message names; a field of one vesicle is one of the field of all.
+   * Mark the inputs whose paths a message names. The input of all vesicles stands for the field of one of them.
    *
    * @param {string} message
    */

@@ -1,4 +1,4 @@
-"""Who may do what: tokens, their scopes and their end."""
+"""Who may do what: tokens, their scopes and their expiry."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def bearer(token: str) -> dict[str, str]:
     return {"Authorization": f"Bearer {token}"}
 
 
-def test_without_tokens_whoever_is_on_this_machine_may_do_everything(submitting):
+def test_without_tokens_everybody_on_this_machine_may_do_everything(submitting):
     assert [submitting.get(path).status_code for path in PROTECTED + PUBLIC] == [200] * 8
     job = submitting.post("/jobs", json=SUBMISSION).json()
     assert submitting.delete(f"/jobs/{job['id']}").status_code == 200
@@ -33,13 +33,13 @@ def test_without_tokens_whoever_is_on_this_machine_may_do_everything(submitting)
     "host", ["evil.example", "evil.example:80", "localhost.evil.example", "127.0.0.1@evil.example", "[", ""]
 )
 def test_without_tokens_another_name_for_this_machine_is_refused(submitting, host):
-    """A page of another site, whose name points here since it was loaded, sends that name."""
+    """A page of another site whose name now resolves to this machine sends that name (DNS rebinding)."""
     response = submitting.post("/jobs", json=SUBMISSION, headers={"Host": host})
     assert response.status_code == 421
     assert submitting.get("/jobs").json()["items"] == []
 
 
-def test_with_tokens_one_is_needed(store):
+def test_with_tokens_every_request_needs_one(store):
     token = make_token(store, "ada", TokenScope.READ)
     with client_of(store) as client:
         for path in PROTECTED:
@@ -80,7 +80,7 @@ def test_the_same_idempotency_key_of_two_users_is_two_jobs(store):
     assert jobs[0]["id"] != jobs[1]["id"]
 
 
-def test_a_token_ends_when_it_said_it_would(store):
+def test_a_token_expires(store):
     valid = make_token(store, "ada", TokenScope.READ)
     expired = make_token(store, "ada", TokenScope.READ, timedelta(seconds=-1))
     with client_of(store) as client:
@@ -88,21 +88,21 @@ def test_a_token_ends_when_it_said_it_would(store):
         assert client.get("/jobs", headers=bearer(expired)).status_code == 401
 
 
-def test_a_service_whose_tokens_have_all_ended_is_not_open(store):
+def test_a_service_whose_tokens_have_all_expired_is_not_open(store):
     make_token(store, "ada", TokenScope.READ, timedelta(seconds=-1))
     with client_of(store) as client:
         assert client.get("/jobs").status_code == 401
 
 
 def near_misses(token: str) -> list[str]:
-    """The token with one character changed, each in turn, and parts of it."""
+    """Return the token with each character changed in turn, and parts of the token."""
     other = {at: "1" if character == "0" else "0" for at, character in enumerate(token)}
     identifier, secret = token.split(".")
     changed = [token[:at] + character + token[at + 1 :] for at, character in other.items()]
     return [*changed, token[:-1], token + "x", token.upper(), identifier, f"{identifier}.", secret, "."]
 
 
-def test_nothing_but_the_whole_token_will_do(store):
+def test_only_the_whole_token_is_accepted(store):
     token = make_token(store, "ada", TokenScope.ADMIN)
     with client_of(store, refusal_rate="100000/second") as client:
         for wrong in near_misses(token):
@@ -114,17 +114,17 @@ def test_nothing_but_the_whole_token_will_do(store):
         assert client.get("/jobs", headers=bearer(token)).status_code == 200
 
 
-def test_guessing_is_cut_short(store):
+def test_guessing_tokens_is_limited(store):
     token = make_token(store, "ada", TokenScope.READ)
     with client_of(store, refusal_rate="5/minute") as client:
         statuses = [client.get("/jobs", headers=bearer(f"guess.{number}")).status_code for number in range(8)]
         assert statuses == [401] * 5 + [429] * 3
         refused = client.get("/jobs", headers=bearer(token))
-        assert refused.status_code == 429, "not even the right one is told from the others now"
+        assert refused.status_code == 429, "now the valid token is refused as well"
         assert 0 < int(refused.headers["retry-after"]) <= 60
 
 
-def test_the_database_has_no_token(store):
+def test_the_database_does_not_hold_the_secret(store):
     token = make_token(store, "ada", TokenScope.ADMIN)
     secret = token.split(".")[1]
     for file in store.rglob("*"):
@@ -135,7 +135,7 @@ def test_the_database_has_no_token(store):
 Run = Callable[..., subprocess.CompletedProcess[str]]
 
 
-def test_the_command_makes_lists_and_revokes(ensemble: Run, store: Path):
+def test_the_command_creates_lists_and_revokes(ensemble: Run, store: Path):
     place = f"--store={store}"
     made = ensemble("token", "create", "ada", "--scope=read", "--days=1", place)
     assert made.returncode == 0, made.stderr
@@ -182,5 +182,5 @@ def test_the_command_refuses_bad_input(ensemble: Run, store: Path, arguments: li
         ("localhost.example", False),
     ],
 )
-def test_which_addresses_this_machine_alone_reaches(host, expected):
+def test_loopback_addresses(host, expected):
     assert is_loopback(host) is expected

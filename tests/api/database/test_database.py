@@ -1,4 +1,4 @@
-"""Tables that are what the code says, and commits that last."""
+"""The migrations make the tables that the code declares, and commits are durable."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from api.jobs.job_queue import Jobs
 jobs = Jobs(Database.open(sys.argv[1], Path(sys.argv[2])), Path(sys.argv[2]))
 work = preset_work("doublet-shear", {})
 while True:
-    # One write that is whole or not there, as an answer over a socket would be.
+    # One write, which arrives as a whole or not at all, like an answer over a socket.
     os.write(1, (jobs.settled(jobs.offer(work, "ada", 1, 60.0)).job.id + "\\n").encode())
 """
 
@@ -49,12 +49,12 @@ def migrations(connection) -> Config:
     return config
 
 
-def test_the_migrations_make_the_tables_of_the_code(database):
+def test_the_migrations_make_the_declared_tables(database):
     with database.begin() as connection:
         command.check(migrations(connection))  # raises where they differ
 
 
-def test_every_migration_can_be_taken_back(database):
+def test_every_migration_can_be_reverted(database):
     with database.begin() as connection:
         command.downgrade(migrations(connection), "base")
         left = set(inspect(connection).get_table_names())
@@ -75,7 +75,7 @@ def test_sqlite_syncs_every_commit(store):
         assert connection.scalar(text("PRAGMA synchronous")) == 2, "2 is FULL"
 
 
-def test_what_is_accepted_outlives_its_process(database_url, store):
+def test_accepted_jobs_survive_a_kill(database_url, store):
     command = [sys.executable, "-c", SUBMITTING, database_url, str(store)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as submitting:
         acknowledged = [submitting.stdout.readline().strip() for _ in range(20)]
@@ -103,7 +103,7 @@ def test_a_database_that_cannot_be_used_is_refused_on_one_line(url, store):
     assert "\n" not in str(refused.value)
 
 
-def test_a_change_that_fails_is_undone(database, jobs):
+def test_a_failing_transaction_is_rolled_back(database, jobs):
     kept = accepted(jobs, preset_work("doublet-shear", {}), "ada", 1, 60.0).job
 
     def change_and_fail() -> None:

@@ -1,4 +1,4 @@
-"""Boundaries over HTTP, and critical values read off them."""
+"""Boundaries over HTTP, and critical values read from them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def address(reading) -> str:
     return f"/boundaries/{boundary['study_key']}"
 
 
-def test_a_boundary_is_the_stored_one_and_a_line(reading, address, filled_store):
+def test_a_boundary_is_the_stored_one_with_a_line(reading, address, filled_store):
     with Store.existing(filled_store) as store:
         (stored,) = store.boundaries()
     document = reading.get(address).json()
@@ -59,7 +59,7 @@ def test_a_boundary_that_has_changed_is_sent_again(tmp_path):
 
 
 @pytest.mark.parametrize("rate", SWEEP)
-def test_at_a_point_it_is_that_point(reading, address, rate):
+def test_at_a_point_the_value_is_that_of_the_point(reading, address, rate):
     answer = reading.get(f"{address}/at", params={"flow.rate": rate}).json()
     low, high = critical(rate) / 1.005, critical(rate) * 1.005
     assert answer["critical_value"] == pytest.approx(critical(rate), rel=1e-12)
@@ -68,7 +68,7 @@ def test_at_a_point_it_is_that_point(reading, address, rate):
 
 
 @pytest.mark.parametrize("rate", [0.3, 0.4, 0.6, 0.75, 0.99, 1.2, 1.45])
-def test_between_points_the_uncertainty_holds_the_truth(reading, address, rate):
+def test_between_points_the_uncertainty_contains_the_exact_value(reading, address, rate):
     answer = reading.get(f"{address}/at", params={"flow.rate": rate}).json()
     low, high = answer["uncertainty"]
     assert low < critical(rate) < high
@@ -77,7 +77,7 @@ def test_between_points_the_uncertainty_holds_the_truth(reading, address, rate):
     assert answer["parameters"] == {"flow.rate": rate}
     (left,), (right,) = (point.values() for point in answer["points"])
     assert left < rate < right
-    # Not by being vague: brackets of one percent, and a parabola that is known from the points.
+    # The interval is not wider than the brackets of one percent and the deviation of the parabola.
     bend = 0.05 * (rate - left) * (right - rate)
     width = (1.005 - 1 / 1.005) * answer["critical_value"]
     assert high - low == pytest.approx(width + 2 * bend, rel=1e-9)
@@ -104,7 +104,7 @@ def test_the_nearest_point_says_where_it_is(reading, address):
         ({"flow.rate": 0.5, "method": "guess"}, "method"),
     ],
 )
-def test_what_cannot_be_read_off_is_refused(reading, address, query, named):
+def test_values_that_cannot_be_read_are_refused(reading, address, query, named):
     response = reading.get(f"{address}/at", params=query)
     assert response.status_code == 422
     assert named in response.json()["detail"]

@@ -1,4 +1,4 @@
-"""Jobs over HTTP: submitted once, listed, listened to, dismissed."""
+"""Jobs over HTTP: submitted, listed, watched, dismissed."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ SECONDS = 20
 
 @pytest.fixture
 def queue(store: Path) -> Iterator[Jobs]:
-    """The queue of the service that is submitted to."""
+    """The queue of the service to which `submitting` submits."""
     with Database.open(Settings(store=store).database_url, store) as database:
         yield Jobs(database, store)
 
@@ -49,7 +49,7 @@ def test_a_preset_becomes_a_job(submitting, queue):
     assert queue.get(job["id"]).owner == "local"
 
 
-def test_what_is_changed_is_what_is_carried_out(submitting, queue):
+def test_the_job_has_the_changes(submitting, queue):
     job = submit(submitting, preset="doublet-shear", set={"flow.rate": 0.75, "vesicles.reduced_area": 0.8})
     scene = queue.document(queue.get(job["id"]))
     assert scene["flow"] == {"kind": "shear", "rate": 0.75}
@@ -57,7 +57,7 @@ def test_what_is_changed_is_what_is_carried_out(submitting, queue):
 
 
 @pytest.mark.parametrize("kind", ["study", "scene"])
-def test_a_document_is_as_good_as_a_preset(submitting, kind):
+def test_a_document_makes_the_same_job_as_its_preset(submitting, kind):
     preset, model = {
         "study": ("critical-hamaker", load_study("critical-hamaker")),
         "scene": ("doublet-shear", load_scene("doublet-shear")),
@@ -105,7 +105,7 @@ def test_other_content_than_json_is_refused(submitting):
     assert "application/json" in response.json()["detail"]
 
 
-def test_one_idempotency_key_is_one_job_however_often_and_at_once(submitting):
+def test_concurrent_requests_with_one_idempotency_key_make_one_job(submitting):
     body = {"preset": "doublet-shear"}
     headers = {"Idempotency-Key": "the same"}
     ready = threading.Barrier(50)
@@ -164,23 +164,23 @@ def events(response: httpx.Response) -> Iterator[tuple[str, dict[str, Any]]]:
             yield name, json.loads(value)
 
 
-def test_a_listener_hears_of_every_change_until_the_end(submitting, queue):
+def test_events_are_sent_for_every_change_until_the_end(submitting, queue):
     job = submit(submitting, preset="doublet-shear")
     with submitting.stream("GET", f"/jobs/{job['id']}/events", timeout=SECONDS) as response:
         assert response.headers["content-type"].startswith("text/event-stream")
-        heard = events(response)
-        assert next(heard) == ("job", job)
+        received = events(response)
+        assert next(received) == ("job", job)
         lease = queue.lease("worker")
         assert lease is not None
-        running = next(heard)[1]
+        running = next(received)[1]
         assert (running["status"], running["attempts"]) == ("running", 1)
         assert queue.heartbeat(lease, 40, "four of ten")
-        middle = next(heard)[1]
+        middle = next(received)[1]
         assert (middle["progress"], middle["message"]) == (40, "four of ten")
         assert queue.finish(lease, JobStatus.SUCCEEDED, "done")
-        last = next(heard)[1]
+        last = next(received)[1]
         assert (last["status"], last["message"]) == ("succeeded", "done")
-        assert list(heard) == []
+        assert list(received) == []
     assert submitting.get(f"/jobs/{job['id']}").json() == last
 
 
@@ -312,17 +312,17 @@ def test_a_service_whose_store_is_gone_is_alive_but_not_ready(store):
         assert response.headers["content-type"] == "application/problem+json"
 
 
-def test_a_hundred_listeners_hear_of_the_end(submitting, queue):
+def test_a_hundred_listeners_get_the_last_event(submitting, queue):
     job = submit(submitting, preset="doublet-shear")
     address = f"{submitting.base_url}/jobs/{job['id']}/events"
     listening = threading.Semaphore(0)
 
     def listen(_: int) -> str:
         with httpx.stream("GET", address, timeout=SECONDS) as response:
-            heard = events(response)
-            next(heard)
+            received = events(response)
+            next(received)
             listening.release()
-            return str(list(heard)[-1][1]["status"])
+            return str(list(received)[-1][1]["status"])
 
     with ThreadPoolExecutor(100) as pool:
         results = [pool.submit(listen, number) for number in range(100)]

@@ -1,4 +1,4 @@
-"""Runs over HTTP: the same ones that the store has."""
+"""Runs over HTTP are those of the store."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tests.api.servers import client_of
 from tests.api.stores import FRAMES, RATES
 from tests.ensemble.runs import shear_run, shear_scene
 
-OCTETS = {"Accept": "application/octet-stream"}
+BINARY = {"Accept": "application/octet-stream"}
 
 
 @pytest.fixture
@@ -131,12 +131,12 @@ def test_frames_as_json_are_points_in_the_plane(reading, filled_store, bound_run
         ({"start": 8, "stop": 10**9}, range(8, FRAMES)),
     ],
 )
-def test_octets_hold_the_same_frames(reading, bound_run, query, expected):
+def test_binary_frames_are_the_same(reading, bound_run, query, expected):
     document = reading.get(f"/runs/{bound_run}/frames", params=query).json()
     assert document["index"] == list(expected)
-    octets = reading.get(f"/runs/{bound_run}/frames", params=query, headers=OCTETS)
-    assert octets.headers["content-type"] == "application/octet-stream"
-    frames = np.frombuffer(octets.content, dtype="<f4").reshape(len(expected), 1 + 2 * 3 * 32)
+    binary = reading.get(f"/runs/{bound_run}/frames", params=query, headers=BINARY)
+    assert binary.headers["content-type"] == "application/octet-stream"
+    frames = np.frombuffer(binary.content, dtype="<f4").reshape(len(expected), 1 + 2 * 3 * 32)
     membranes = frames[:, 1:].reshape(-1, 2, 3, 32)
     assert np.array_equal(frames[:, 0], np.float32(document["time"]))
     if len(expected):
@@ -192,7 +192,7 @@ def test_tags_of_different_frames_differ(reading, bound_run):
     address = f"/runs/{bound_run}/frames"
     answers = [
         reading.get(address),
-        reading.get(address, headers=OCTETS),
+        reading.get(address, headers=BINARY),
         reading.get(address, params={"stride": 2}),
         reading.get(address, params={"start": 2}),
     ]

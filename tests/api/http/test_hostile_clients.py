@@ -1,4 +1,4 @@
-"""What an attacker tries: each gets a clean refusal, and the service goes on."""
+"""Requests of hostile clients: each is refused with a problem, and the service continues."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def attacked(tmp_path_factory: pytest.TempPathFactory) -> Iterator[httpx.Client]
 
 @pytest.fixture
 def unharmed(attacked: httpx.Client) -> Iterator[httpx.Client]:
-    """A client of a service that, after the test, has no job and answers as before."""
+    """A client of a service that is checked after the test: it has no job and still answers."""
     yield attacked
     assert attacked.get("/jobs").json() == {"items": [], "next": None}
 
@@ -58,7 +58,7 @@ def test_deeply_nested_documents(unharmed, content):
 
 @pytest.mark.parametrize("number", [b"NaN", b"Infinity", b"-Infinity", b"1e999", b"9" * 5000, b'"NaN"'])
 @pytest.mark.parametrize("field", [b"horizon", b"flow.rate", b"numerics.tolerance"])
-def test_numbers_that_are_none(unharmed, field, number):
+def test_numbers_that_json_does_not_have(unharmed, field, number):
     assert_refused(post(unharmed, b'{"preset": "doublet-shear", "set": {"%s": %s}}' % (field, number)), 422)
     scene = b'{"horizon": %s, "vesicles": [{}]}' % number
     assert_refused(post(unharmed, b'{"scene": %s}' % scene), 422)
@@ -83,7 +83,7 @@ def test_numbers_that_are_none(unharmed, field, number):
         b'"doublet-shear"',
     ],
 )
-def test_documents_that_are_none(unharmed, content):
+def test_bodies_that_are_not_json_documents(unharmed, content):
     assert_refused(post(unharmed, content), 422)
 
 
@@ -109,7 +109,7 @@ def test_documents_that_are_none(unharmed, content):
         {"preset": "doublet-shear", "set": {f"criteria.{number}": 1 for number in range(10_000)}},
     ],
 )
-def test_work_without_measure_is_refused_at_once(unharmed, submission):
+def test_excessive_work_is_refused_at_once(unharmed, submission):
     begun = time.monotonic()
     assert_refused(unharmed.post("/jobs", json=submission), 422)
     assert time.monotonic() - begun < SECONDS
@@ -154,10 +154,10 @@ TRAVERSALS = [
         "/assets/{}",
     ],
 )
-def test_paths_lead_nowhere(reading, address, name):
+def test_paths_do_not_leave_their_folder(reading, address, name):
     base = reading.base_url
     request = reading.build_request("GET", "/")
-    # As it is: the client would tidy it up.
+    # Sent unchanged: the client would normalize it.
     request.url = base.copy_with(raw_path=address.format(name).encode())
     response = reading.send(request)
     assert_refused(response, 404, 422)
@@ -180,7 +180,7 @@ def test_paths_lead_nowhere(reading, address, name):
         'scene"]=1',
     ],
 )
-def test_filters_are_no_sql(reading, condition):
+def test_filters_are_not_interpreted_as_sql(reading, condition):
     before = reading.get("/runs").json()
     response = reading.get("/runs", params={"where": condition})
     if response.status_code == 200:
@@ -196,7 +196,7 @@ def test_filters_compare_with_finite_numbers(reading, number):
 
 
 def raw(client: httpx.Client, *pieces: bytes, pause: float = 0.0) -> bytes:
-    """Send bytes as they are and return all that is answered until the connection ends."""
+    """Send bytes unchanged, and return everything that is answered until the connection ends."""
     address = (client.base_url.host, client.base_url.port)
     with socket.create_connection(address, timeout=SECONDS) as connection:
         try:
@@ -204,7 +204,7 @@ def raw(client: httpx.Client, *pieces: bytes, pause: float = 0.0) -> bytes:
                 connection.sendall(piece)
                 time.sleep(pause)
         except (BrokenPipeError, ConnectionResetError):
-            pass  # the service has heard enough
+            pass  # the service has closed the connection
         answer = b""
         try:
             while received := connection.recv(65536):
@@ -235,11 +235,11 @@ HEAD = b"Host: localhost\r\nConnection: close\r\n"
         b"NONSENSE\r\n\r\n",
     ],
 )
-def test_heads_that_are_none(unharmed, head):
+def test_invalid_heads(unharmed, head):
     assert 400 <= status_of(raw(unharmed, head)) < 500
 
 
-def test_what_a_client_sends_is_in_no_header_of_the_answer(submitting):
+def test_headers_of_answers_hold_nothing_that_a_client_sent(submitting):
     made = submitting.post(
         "/jobs",
         json={"preset": "doublet-shear"},
@@ -254,7 +254,7 @@ def test_what_a_client_sends_is_in_no_header_of_the_answer(submitting):
     assert "injected" not in str(listed.headers).lower()
 
 
-def test_a_head_that_does_not_come(store):
+def test_a_head_that_does_not_arrive_in_time(store):
     with client_of(store, header_seconds=0.5) as client:
         begun = time.monotonic()
         assert status_of(raw(client, b"GET /jobs HTTP/1.1\r\nHost: localhost\r\n")) == 400
@@ -263,7 +263,7 @@ def test_a_head_that_does_not_come(store):
         assert client.get("/jobs").status_code == 200
 
 
-def test_a_head_without_end(store):
+def test_an_endless_head(store):
     with client_of(store, header_bytes=10_000) as client:
         endless = [b"GET /jobs HTTP/1.1\r\nHost: localhost\r\n", *[b"X: " + b"y" * 1000 + b"\r\n"] * 100]
         assert status_of(raw(client, *endless)) == 400
@@ -273,7 +273,7 @@ def test_a_head_without_end(store):
         assert client.get("/jobs").status_code == 200
 
 
-def test_a_body_that_does_not_come(store):
+def test_a_body_that_does_not_arrive_in_time(store):
     with client_of(store, body_seconds=0.5) as client:
         head = (
             b"POST /jobs HTTP/1.1\r\n"
@@ -288,7 +288,7 @@ def test_a_body_that_does_not_come(store):
         assert client.get("/jobs").json()["items"] == []
 
 
-def test_many_idle_connections_do_not_keep_others_out(store):
+def test_many_idle_connections_do_not_block_others(store):
     with client_of(store, header_seconds=1.0, connections=50) as client:
         address = (client.base_url.host, client.base_url.port)
         idle = [socket.create_connection(address, timeout=SECONDS) for _ in range(80)]
@@ -317,7 +317,7 @@ def test_requests_are_counted_for_each_user(store):
 
 
 @pytest.mark.parametrize("path", ["/jobs", "/nowhere", "/healthz", "/jobs/UPPER"])
-def test_every_answer_has_the_safe_headers_and_no_other_site_may_read_it(reading, path):
+def test_every_answer_has_the_security_headers_and_other_sites_may_not_read_it(reading, path):
     response = reading.get(path, headers={"Origin": "https://evil.example"})
     for name, value in SECURITY_HEADERS.items():
         assert response.headers[name] == value
@@ -325,7 +325,7 @@ def test_every_answer_has_the_safe_headers_and_no_other_site_may_read_it(reading
     assert "server" not in response.headers
 
 
-def test_other_sites_may_not_ask_ahead(reading):
+def test_preflight_requests_of_other_sites_are_refused(reading):
     response = reading.options(
         "/jobs",
         headers={
