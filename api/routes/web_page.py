@@ -1,4 +1,4 @@
-"""The web page at `/`: files that ship with the package, without anything from other sites."""
+"""The web page at `/`: files that ship with this package and with Plotly's, without anything from other sites."""
 
 from __future__ import annotations
 
@@ -12,13 +12,16 @@ from starlette.staticfiles import StaticFiles
 
 STATIC = Path(str(files("api") / "static"))
 
-# Scripts and style sheets come from this service only, and nothing is written inline into the page. The one
-# exception is the empty style element that Plotly adds and fills by script: its hash is that of no text.
+PLOTTING = Path(str(files("plotly") / "package_data"))
+
+# Scripts, style sheets and data come from this service only.  Plotly adds style elements of its own (one that
+# it fills by script, one for maps), whose text changes with its version, so inline styles are allowed; they
+# cannot run code.
 CONTENT_SECURITY_POLICY = "; ".join(
     (
         "default-src 'none'",
         "script-src 'self'",
-        "style-src 'self' 'sha256-47DEQpj8HBSa+/TImW+5JCeuQeRkm5NMpJWZG3hSuFU='",
+        "style-src 'self' 'unsafe-inline'",
         "img-src 'self' data:",
         "connect-src 'self'",
         "base-uri 'none'",
@@ -39,6 +42,7 @@ def add_web_page(app: FastAPI) -> None:
     app : FastAPI
     """
     app.add_api_route("/", _get_web_page, include_in_schema=False)
+    app.mount("/assets/plotly", GZipMiddleware(StaticFiles(directory=PLOTTING)))
     app.mount("/assets", GZipMiddleware(StaticFiles(directory=STATIC)))
 
 

@@ -15,13 +15,10 @@ const CONFIGURATION = {
   toImageButtonOptions: { format: "svg" },
 };
 
-/**
- * Plotly with scatter plots only; `api/README.md` says how this file is built.
- *
- * @returns {Promise<any>}
- */
+/** @returns {Promise<any>} */
 async function loadPlotly() {
-  return (await import("./vendor/plotly.js")).default;
+  await import("./plotly/plotly.min.js"); // not a module: it defines one global
+  return /** @type {any} */ (globalThis).Plotly;
 }
 
 /** An element in which figures are drawn. Each figure replaces the one before. */
