@@ -10,7 +10,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager
 from functools import cached_property
+from ipaddress import ip_address
 from typing import TYPE_CHECKING, Any, Final
+from urllib.request import getproxies, proxy_bypass
 from uuid import uuid4
 
 import httpx
@@ -164,7 +166,8 @@ class Client(AbstractContextManager["Client"]):
     """A connection to a service.
 
     Use it as a context manager, or close it. While the service cannot be reached, for example during a
-    restart, requests are repeated for a minute; then `httpx.TransportError` is raised.
+    restart, requests are repeated for a minute; then `httpx.TransportError` is raised. A service on this machine
+    is reached directly, whatever proxy the environment names; for others the error names the proxy.
 
     Parameters
     ----------
@@ -176,7 +179,11 @@ class Client(AbstractContextManager["Client"]):
 
     def __init__(self, url: str, token: str | None = None) -> None:
         headers = {} if token is None else {"Authorization": f"Bearer {token}"}
-        self._http = httpx.Client(base_url=url, headers=headers, timeout=TIMEOUT_SECONDS)
+        host = httpx.URL(url).host
+        self._proxy = None if _is_loopback(host) else _proxy_of(httpx.URL(url))
+        self._http = httpx.Client(
+            base_url=url, headers=headers, timeout=TIMEOUT_SECONDS, trust_env=not _is_loopback(host)
+        )
 
     def close(self) -> None:
         """Close the connections."""
@@ -430,7 +437,12 @@ class Client(AbstractContextManager["Client"]):
 
     @_with_retries
     def _request(self, method: str, path: str, **options: Any) -> httpx.Response:
-        return _checked(self._http.request(method, path, **options))
+        try:
+            return _checked(self._http.request(method, path, **options))
+        except httpx.TransportError as error:
+            if self._proxy is not None:
+                error.add_note(f"The environment sends this request through the proxy {self._proxy}.")
+            raise
 
     def _items(self, path: str, parameters: Mapping[str, Any] = {}) -> Iterator[dict[str, Any]]:
         page = self.get(path, params=parameters).json()
@@ -438,6 +450,19 @@ class Client(AbstractContextManager["Client"]):
         while page["next"]:
             page = self.get(page["next"]).json()
             yield from page["items"]
+
+
+def _is_loopback(host: str) -> bool:
+    """Tell whether a host name or address is this machine's own."""
+    try:
+        return ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+def _proxy_of(url: httpx.URL) -> str | None:
+    """Return the proxy that the environment names for an address."""
+    return None if proxy_bypass(url.host) else getproxies().get(url.scheme)
 
 
 def _submission(work: str | Study | Scene, changes: Mapping[str, Any]) -> dict[str, Any]:

@@ -27,7 +27,10 @@ Where = Annotated[
 
 
 class CollectionPage(BaseModel, Generic[Item]):
-    """A page of a collection; `next` is the path of the page that follows, null on the last page."""
+    """A page of a collection; `next` is the address of the page that follows, null on the last page.
+
+    It is relative to the address of this page, so it also holds behind a proxy that adds a prefix.
+    """
 
     items: list[Item]
     next: str | None
@@ -41,7 +44,7 @@ def page_response(request: Request, records: Sequence[Record], limit: int) -> Re
     Parameters
     ----------
     request : Request
-        The request for this page; the path of the next page is made from it.
+        The request for this page; the address of the next page is made from it.
     records : sequence of Record
         Up to ``limit + 1`` records: the additional one shows that there is a next page.
     limit : int
@@ -55,6 +58,6 @@ def page_response(request: Request, records: Sequence[Record], limit: int) -> Re
     next_page = None
     if len(records) > limit:
         parts = urlsplit(str(request.url.include_query_params(after=items[-1].key)))
-        next_page = f"{parts.path}?{parts.query}"
+        next_page = f"{parts.path.rpartition('/')[2]}?{parts.query}"
     listed = ",".join(record.json for record in items)
     return json_response(f'{{"items":[{listed}],"next":{json.dumps(next_page)}}}')

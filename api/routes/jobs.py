@@ -141,7 +141,8 @@ async def submit_job(
         raise Problem(HTTPStatus.TOO_MANY_REQUESTS, str(error)) from error
     response = json_response(submitted.job)
     response.status_code = HTTPStatus.ACCEPTED
-    response.headers["Location"] = f"/jobs/{submitted.job.id}"
+    # Relative to the address of the request, for proxies that add a prefix.
+    response.headers["Location"] = f"jobs/{submitted.job.id}"
     return response
 
 

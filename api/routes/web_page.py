@@ -1,4 +1,4 @@
-"""The web page at `/`: files that ship with this package and with Plotly's, without anything from other sites."""
+"""The web page at `/`: files that ship with this package and with Plotly's, and nothing from other sites."""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-/** Requests to the service. Addresses are paths, for example `/jobs`. Errors are thrown as `Problem`. */
+/**
+ * Requests to the service. Addresses are paths from its root, for example `/jobs`. A proxy may serve it below a prefix
+ * of its own, so they are resolved against the address of the page. Errors are thrown as `Problem`.
+ */
 
 import { Problem } from "./problems.js";
 import { askForToken, token } from "./token.js";
@@ -18,7 +21,7 @@ async function request(path, options = {}) {
   if (sentToken) {
     headers.set("Authorization", `Bearer ${sentToken}`);
   }
-  const response = await fetch(path, { ...options, headers });
+  const response = await fetch(new URL(path.replace(/^\//, ""), document.baseURI), { ...options, headers });
   if (response.ok) {
     return response;
   }
