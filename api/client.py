@@ -20,15 +20,14 @@ import numpy as np
 from httpx_sse import connect_sse
 from tenacity import retry, retry_if_exception_type, stop_after_delay, wait_exponential
 
-from api.jobs.cost_estimate import Estimate
 from api.jobs.job import Job
-from api.jobs.submissions import PresetDocument
+from api.jobs.submissions import Estimate, PresetDocument
 from api.results.boundary_values import BoundaryDocument, CriticalValueDocument, ReadingMethod
-from ensemble.config.study import Study
 from ensemble.errors import EnsembleError
+from ensemble.questions import kind_of_model
 from ensemble.store.run_record import FRAME_DIMENSIONS, RunSummary
 from solver.analysis.run import Array
-from solver.scene import Scene
+from solver.scene import Model
 
 if TYPE_CHECKING:
     import xarray
@@ -196,7 +195,7 @@ class Client(AbstractContextManager["Client"]):
         """Return the studies and scenes that ship with the service, with the largest cost of each."""
         return [PresetDocument.model_validate(item) for item in self._items("/presets")]
 
-    def estimate(self, work: str | Study | Scene, changes: Mapping[str, Any] = {}) -> Estimate:
+    def estimate(self, work: str | Model, changes: Mapping[str, Any] = {}) -> Estimate:
         """Return an upper bound of the cost of a job without submitting it.
 
         Parameters
@@ -220,7 +219,7 @@ class Client(AbstractContextManager["Client"]):
 
     def submit(
         self,
-        work: str | Study | Scene,
+        work: str | Model,
         changes: Mapping[str, Any] = {},
         ranks: int | None = None,
         seconds: float | None = None,
@@ -229,7 +228,7 @@ class Client(AbstractContextManager["Client"]):
 
         Parameters
         ----------
-        work : str, Study or Scene
+        work : str or Model
             Name of a preset, or what to carry out.
         changes : mapping
             Values by dotted path, for example ``{"flow.rate": 0.6}``.
@@ -465,11 +464,10 @@ def _proxy_of(url: httpx.URL) -> str | None:
     return None if proxy_bypass(url.host) else getproxies().get(url.scheme)
 
 
-def _submission(work: str | Study | Scene, changes: Mapping[str, Any]) -> dict[str, Any]:
+def _submission(work: str | Model, changes: Mapping[str, Any]) -> dict[str, Any]:
     if isinstance(work, str):
         return {"preset": work, "set": dict(changes)}
-    name = "study" if isinstance(work, Study) else "scene"
-    return {name: work.model_dump(mode="json"), "set": dict(changes)}
+    return {kind_of_model(work).kind: work.model_dump(mode="json"), "set": dict(changes)}
 
 
 def _checked(response: httpx.Response) -> httpx.Response:

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from api.auth import TokenScope
-from ensemble.cli.main import DEFAULT_STORE, StorePath
+from ensemble.cli.options import StorePath
+from ensemble.config.defaults import DEFAULT_STORE
 from ensemble.errors import BadInput
 
 if TYPE_CHECKING:

@@ -22,13 +22,13 @@ from api.auth.tokens import Tokens
 from api.database.service_database import Database, look_up_for
 from api.http.bounded_protocol import bounded_protocol
 from api.http.rate_limits import RateLimits
-from api.jobs.job import preset_work
 from api.jobs.job_queue import Jobs
 from api.jobs.submissions import Submissions
 from api.routes.service import Service
 from api.settings import Settings
 from ensemble.config.documents import preset_names
 from ensemble.errors import BadInput
+from ensemble.questions import preset_question
 from ensemble.store import Store
 from ensemble.store.sql_database import Place
 
@@ -168,7 +168,7 @@ def _warm_up() -> None:
     The first submission would wait for the one, and a full collection takes as long as a hundred requests.
     """
     for name in preset_names():
-        preset_work(name, {})
+        preset_question(name, {})
     gc.collect()
     gc.freeze()
 

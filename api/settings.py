@@ -9,7 +9,7 @@ from typing import Annotated
 from pydantic import AfterValidator, Field
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
-from ensemble.cli.main import DEFAULT_STORE
+from ensemble.config.defaults import DEFAULT_STORE
 from ensemble.store.sql_database import Place, is_file, sqlite_url
 
 

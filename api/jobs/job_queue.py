@@ -1,7 +1,7 @@
 """The queue: jobs in a database, from where workers lease them.
 
-Every change is one statement that says which state it is a change of.  So it either happens as a whole or,
-where somebody else was first, not at all, whatever the number of processes and whatever the database.
+Every change is one statement that names the state which it changes.  So it either happens as a whole or, if
+another process was first, not at all, whatever the number of processes and whatever the database.
 """
 
 from __future__ import annotations
@@ -29,21 +29,36 @@ from sqlalchemy import (
 
 from api.database.database_tables import JobRow
 from api.database.service_database import Database
-from api.jobs.intake import Intake
-from api.jobs.job import UNFINISHED, IdempotencyConflict, Job, JobStatus, Lease, TooManyJobs, Work
+from api.jobs.group_commit import GroupCommit
+from api.jobs.job import UNFINISHED, IdempotencyConflict, Job, JobStatus, Lease, TooManyJobs
 from api.jobs.job_records import JobRecords
-from api.jobs.worker_name import has_died
+from api.jobs.worker_identity import has_died
+from ensemble.questions import Question
 from ensemble.timestamp import now
 
 LEASE_SECONDS = 3.0
 LOGS = "jobs"  # directory in the store
 
-_SEEN = tuple(getattr(JobRow, name) for name in Job.model_fields)
+_JOB_COLUMNS = tuple(getattr(JobRow, name) for name in Job.model_fields)
 
 
 @dataclass(frozen=True)
-class Offer:
-    """A job on its way to disk; `accepted` has a result as soon as that is decided."""
+class PendingSubmission:
+    """A job on its way to disk.
+
+    Attributes
+    ----------
+    job : Job
+        As it is if it is accepted.
+    idempotency_key : str or None
+        Of the owner's choice.
+    fingerprint : str
+        Digest of the request.
+    most_unfinished : int or None
+        How many unfinished jobs the owner may have.
+    accepted : Future
+        Its result is whether the job is new and on disk.
+    """
 
     job: Job
     idempotency_key: str | None
@@ -53,8 +68,16 @@ class Offer:
 
 
 @dataclass(frozen=True)
-class Submitted:
-    """A job that is committed to disk, and whether it is new or that of an earlier equal request."""
+class SubmissionResult:
+    """A job that is on disk.
+
+    Attributes
+    ----------
+    job : Job
+        The new one, or that of an earlier request with the same idempotency key.
+    new : bool
+        Whether it is new.
+    """
 
     job: Job
     new: bool
@@ -63,55 +86,67 @@ class Submitted:
 class Jobs:
     """The jobs of a service, for any number of processes and threads at once.
 
-    `records` are the same jobs as JSON.
-
     Parameters
     ----------
     database : Database
+        That has the jobs.
     store : Path
-        Directory of the store, which keeps the jobs' logs, too.
+        Directory of the store, which also keeps the jobs' logs.
     clock : callable
-        The present.  The clocks of hosts that share a queue must agree to within a fraction of
+        Returns the present.  The clocks of hosts that share a queue must agree to within a fraction of
         `LEASE_SECONDS`.
+
+    Attributes
+    ----------
+    records : JobRecords
+        The same jobs as JSON.
     """
 
     def __init__(self, database: Database, store: Path, clock: Callable[[], datetime] = now) -> None:
         self.records = JobRecords(database)
         self._database = database
-        self._intake = Intake(database)
+        self._group_commit = GroupCommit(database)
         self._directory = store / LOGS
         self._clock = clock
 
-    def offer(
+    def submit(
         self,
-        work: Work,
+        question: Question[Any],
         owner: str,
         ranks: int,
         seconds: float,
         idempotency_key: str | None = None,
         most_unfinished: int | None = None,
-    ) -> Offer:
+    ) -> PendingSubmission:
         """Put a job on its way to disk, and return at once.
 
         Parameters
         ----------
-        work : Work
+        question : Question
+            What the job answers.
         owner : str
+            The user who submits it.
         ranks : int
+            How many processes the job uses.
         seconds : float
             How long an attempt may take.
         idempotency_key : str, optional
-            Of the owner's choice.  However often a request comes with one key, it makes one job.
+            Of the owner's choice.  Repeated requests with one key make one job.
         most_unfinished : int, optional
             How many unfinished jobs the owner may have, this one included.
+
+        Returns
+        -------
+        PendingSubmission
+            What `result` takes.
         """
         moment = self._clock()
         job = Job(
             id=secrets.token_hex(16),
             owner=owner,
-            kind=work.kind,
-            name=work.name,
-            key=work.key,
+            kind=question.kind,
+            name=question.name,
+            key=question.key,
             ranks=ranks,
             seconds=seconds,
             status=JobStatus.ACCEPTED,
@@ -123,105 +158,174 @@ class Jobs:
             finished=None,
             updated=moment,
         )
-        fingerprint = _fingerprint(work, ranks, seconds)
+        fingerprint = _fingerprint(question, ranks, seconds)
         row = dict(job) | {
-            "document": work.document,
+            "document": question.fields,
             "idempotency_key": idempotency_key,
             "fingerprint": fingerprint,
         }
-        accepted = self._intake.add(row, most_unfinished)
-        return Offer(job, idempotency_key, fingerprint, most_unfinished, accepted)
+        accepted = self._group_commit.add(row, most_unfinished)
+        return PendingSubmission(job, idempotency_key, fingerprint, most_unfinished, accepted)
 
-    def settled(self, offer: Offer) -> Submitted:
-        """Wait until a job that was offered is on disk.
+    def result(self, pending: PendingSubmission) -> SubmissionResult:
+        """Wait until a job that was submitted is on disk.
+
+        Parameters
+        ----------
+        pending : PendingSubmission
+            What `submit` has returned.
+
+        Returns
+        -------
+        SubmissionResult
+            The job.
 
         Raises
         ------
         IdempotencyConflict
-            If the key came with another request before.
+            If an earlier request with the same key was another one.
         TooManyJobs
-            If the owner has as many as that.  Processes that accept jobs at the same moment do not see each
-            other's, so together they may accept a few more.
+            If the owner has too many unfinished jobs.  Processes that accept jobs at the same moment do not
+            see each other's, so together they may accept a few more.
         """
-        if offer.accepted.result():
-            return Submitted(offer.job, new=True)
-        earlier = self._earlier(offer)
+        if pending.accepted.result():
+            return SubmissionResult(pending.job, new=True)
+        earlier = self._earlier(pending)
         if earlier is None:
             raise TooManyJobs(
-                f"jobs: {offer.most_unfinished} of {offer.job.owner} are not finished, "
+                f"jobs: {pending.most_unfinished} of {pending.job.owner} are not finished, "
                 "and there may not be more"
             )
-        return Submitted(earlier, new=False)
+        return SubmissionResult(earlier, new=False)
 
-    def _earlier(self, offer: Offer) -> Job | None:
+    def _earlier(self, pending: PendingSubmission) -> Job | None:
         """Return the job that an idempotency key has made already."""
-        if offer.idempotency_key is None:
+        if pending.idempotency_key is None:
             return None
-        query = select(*_SEEN, JobRow.fingerprint).where(
-            JobRow.owner == offer.job.owner, JobRow.idempotency_key == offer.idempotency_key
+        query = select(*_JOB_COLUMNS, JobRow.fingerprint).where(
+            JobRow.owner == pending.job.owner, JobRow.idempotency_key == pending.idempotency_key
         )
         with self._database.connect() as connection:
             row = connection.execute(query).one_or_none()
         if row is None:
             return None
-        if row.fingerprint != offer.fingerprint:
+        if row.fingerprint != pending.fingerprint:
             raise IdempotencyConflict(
-                f"Idempotency-Key: {offer.idempotency_key} came with another request before; use a new one"
+                f"Idempotency-Key: {pending.idempotency_key} has been used for another request; use a new one"
             )
         return Job.model_validate(row)
 
     def get(self, identifier: str) -> Job:
         """Return a job.
 
+        Parameters
+        ----------
+        identifier : str
+            Of the job.
+
+        Returns
+        -------
+        Job
+            As it is now.
+
         Raises
         ------
         NoSuchJob
+            If there is none.
         """
         return Job.model_validate_json(self.records.one(identifier).json)
 
     def document(self, job: Job) -> dict[str, Any]:
-        """Return the study or the scene that a job carries out."""
+        """Return the document of the question that a job answers.
+
+        Parameters
+        ----------
+        job : Job
+            The job.
+
+        Returns
+        -------
+        dict
+            In full.
+        """
         with self._database.connect() as connection:
             return connection.execute(select(JobRow.document).where(JobRow.id == job.id)).scalar_one()
 
     def latest(
         self, limit: int, after: str | None = None, owner: str | None = None, status: JobStatus | None = None
     ) -> list[Job]:
-        """Return jobs, the latest first: at most `limit`, from the one that follows `after`.
+        """Return jobs, the latest first.
+
+        Parameters
+        ----------
+        limit : int
+            How many at most.
+        after : str, optional
+            Identifier of the job before the first; by default the latest is the first.
+        owner : str, optional
+            Whose jobs.
+        status : JobStatus, optional
+            Which status they have.
+
+        Returns
+        -------
+        list of Job
+            As they are now.
 
         Raises
         ------
         NoSuchJob
             If there is no job `after`.
         """
-        found = self.records.page(limit, after, owner, status)
-        return [Job.model_validate_json(record.json) for record in found]
+        records = self.records.page(limit, after, owner, status)
+        return [Job.model_validate_json(record.json) for record in records]
 
     def counts(self) -> dict[JobStatus, int]:
-        """Say how many jobs there are of each status."""
+        """Return how many jobs there are of each status."""
         query = select(JobRow.status, func.count()).group_by(JobRow.status)
         with self._database.connect() as connection:
-            found = {JobStatus(status): count for status, count in connection.execute(query)}
-        return {status: found.get(status, 0) for status in JobStatus}
+            counts = {JobStatus(status): count for status, count in connection.execute(query)}
+        return {status: counts.get(status, 0) for status in JobStatus}
 
     def dismiss(self, identifier: str) -> Job:
-        """Give a job up, and return it; one that is finished stays as it is.
+        """Dismiss a job; one that is finished stays as it is.
 
-        A worker that runs it ends its processes as soon as it hears of it.
+        A worker that runs it ends its processes at its next heartbeat.
+
+        Parameters
+        ----------
+        identifier : str
+            Of the job.
+
+        Returns
+        -------
+        Job
+            As it is now.
 
         Raises
         ------
         NoSuchJob
+            If there is none.
         """
         unfinished = update(JobRow).where(JobRow.id == identifier, JobRow.status.in_(UNFINISHED))
         self._change(self._ended(unfinished, JobStatus.DISMISSED, "dismissed"))
         return self.get(identifier)
 
     def lease(self, worker: str) -> Lease | None:
-        """Take the next job for a worker, named by `api.jobs.worker_name`; None if there is none to be had.
+        """Lease the next job to a worker.
 
-        It is the oldest one of the owner who has the fewest running.  A job whose worker has let its lease
-        run out, or is seen to have died, takes part again.
+        It is the oldest job of the owner who has the fewest running.  A job whose worker has let its lease
+        run out, or is known to have died, is available again.
+
+        Parameters
+        ----------
+        worker : str
+            As `api.jobs.worker_identity` identifies it.
+
+        Returns
+        -------
+        Lease or None
+            None if no job is waiting.
         """
         moment = self._clock()
         running = select(JobRow.worker).where(JobRow.status == JobStatus.RUNNING)
@@ -238,7 +342,7 @@ class Jobs:
                 started=func.coalesce(JobRow.started, literal(moment, JobRow.started.type)),
                 updated=moment,
             )
-            .returning(*_SEEN, JobRow.document)
+            .returning(*_JOB_COLUMNS, JobRow.document)
         )
         with self._database.begin() as connection:
             dead = [name for name in connection.scalars(running) if name is not None and has_died(name)]
@@ -254,7 +358,22 @@ class Jobs:
         return None if row is None else Lease(Job.model_validate(row), row.document)
 
     def heartbeat(self, lease: Lease, progress: int, message: str) -> bool:
-        """Renew a lease and say how far the job has come; False if the job is no longer this worker's."""
+        """Renew a lease and record how far the job has come.
+
+        Parameters
+        ----------
+        lease : Lease
+            Of this worker.
+        progress : int
+            From 0 to 100.
+        message : str
+            The same for people.
+
+        Returns
+        -------
+        bool
+            False if the job is no longer this worker's.
+        """
         moment = self._clock()
         return self._change(
             _leased(lease).values(
@@ -266,15 +385,54 @@ class Jobs:
         )
 
     def finish(self, lease: Lease, status: JobStatus, message: str) -> bool:
-        """End a job; False if it is no longer this worker's, which then changes nothing."""
+        """Record how a job has ended.
+
+        Parameters
+        ----------
+        lease : Lease
+            Of this worker.
+        status : JobStatus
+            Succeeded or failed.
+        message : str
+            Explains the status.
+
+        Returns
+        -------
+        bool
+            False if the job is no longer this worker's; then nothing is changed.
+        """
         return self._change(self._ended(_leased(lease), status, message))
 
     def give_back(self, lease: Lease, message: str) -> bool:
-        """Let another worker have the job; False if it is no longer this worker's."""
+        """Make a job available to other workers again.
+
+        Parameters
+        ----------
+        lease : Lease
+            Of this worker.
+        message : str
+            Says why.
+
+        Returns
+        -------
+        bool
+            False if the job is no longer this worker's; then nothing is changed.
+        """
         return self._change(_leased(lease).values(_waiting(message, self._clock())))
 
     def log_path(self, job: Job) -> Path:
-        """Return the file that holds what the job's processes have said; it may not be there yet."""
+        """Return the file of what a job's processes have written to standard error.
+
+        Parameters
+        ----------
+        job : Job
+            The job.
+
+        Returns
+        -------
+        Path
+            The file may not exist yet.
+        """
         return self._directory / f"{job.id}.log"
 
     def _ended(self, whose: Update, status: JobStatus, message: str) -> Update:
@@ -289,8 +447,8 @@ class Jobs:
             return connection.execute(statement).rowcount == 1
 
 
-def _fingerprint(work: Work, ranks: int, seconds: float) -> str:
-    request = f"[{json.dumps(work.name)}, {work.text}, {json.dumps(ranks)}, {json.dumps(seconds)}]"
+def _fingerprint(question: Question[Any], ranks: int, seconds: float) -> str:
+    request = f"[{json.dumps(question.name)}, {question.text}, {json.dumps(ranks)}, {json.dumps(seconds)}]"
     return hashlib.sha256(request.encode()).hexdigest()
 
 

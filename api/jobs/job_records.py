@@ -15,14 +15,14 @@ from ensemble.store import Record
 
 
 def _as_stored(name: str) -> ColumnElement[Any]:
-    """Column of a job's field; points in time are stored as the text that they are sent as."""
+    """Column of a job's field; points in time are stored as the text that is sent."""
     column = getattr(JobRow, name)
     return type_coerce(column, String) if isinstance(column.type, Moment) else column
 
 
 _FIELDS = tuple(Job.model_fields)
 _STORED = select(*(_as_stored(name) for name in _FIELDS))
-# Made once: a statement that is made anew costs as much as the rest of a request for a job.
+# Built once: to build a statement costs as much as the rest of a request for a job.
 _ONE = _STORED.where(JobRow.id == bindparam("identifier"))
 
 
@@ -41,7 +41,13 @@ def _page(after: bool, owner: bool, status: bool) -> Select[Any]:
 
 
 class JobRecords:
-    """Reads the jobs of a database, from any thread."""
+    """Reads the jobs of a database, from any thread.
+
+    Parameters
+    ----------
+    database : Database
+        That has the jobs.
+    """
 
     def __init__(self, database: Database) -> None:
         self._database = database
@@ -49,9 +55,20 @@ class JobRecords:
     def one(self, identifier: str) -> Record:
         """Return a job.
 
+        Parameters
+        ----------
+        identifier : str
+            Of the job.
+
+        Returns
+        -------
+        Record
+            Its identifier and its JSON.
+
         Raises
         ------
         NoSuchJob
+            If there is none.
         """
         with self._database.connect() as connection:
             row = connection.execute(_ONE, {"identifier": identifier}).one_or_none()
@@ -62,7 +79,23 @@ class JobRecords:
     def page(
         self, limit: int, after: str | None = None, owner: str | None = None, status: JobStatus | None = None
     ) -> list[Record]:
-        """Return jobs, the latest first: at most `limit`, from the one that follows `after`.
+        """Return jobs, the latest first.
+
+        Parameters
+        ----------
+        limit : int
+            How many at most.
+        after : str, optional
+            Identifier of the job before the first; by default the latest is the first.
+        owner : str, optional
+            Whose jobs.
+        status : JobStatus, optional
+            Which status they have.
+
+        Returns
+        -------
+        list of Record
+            Identifiers and JSON.
 
         Raises
         ------

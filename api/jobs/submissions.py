@@ -1,112 +1,233 @@
-"""From what somebody submits to the work that a job carries out."""
+"""From what a client submits to the question that a job answers."""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Self
 
 from cachetools import LRUCache
-from pydantic import BaseModel, Field, JsonValue, ValidationError, model_validator
+from pydantic import BaseModel, Field, JsonValue, ValidationError, create_model, model_validator
 from pydantic_core import from_json
 from starlette.concurrency import run_in_threadpool
 
-from api.jobs.cost_estimate import Estimate, estimate
-from api.jobs.job import Kind, Work, preset_work, scene_work, study_work
-from api.jobs.size_limits import limit_scene, limit_study
+from api.jobs.job import KindName
 from ensemble.config.documents import preset_document
 from ensemble.config.overrides import override
-from ensemble.config.study import Study
 from ensemble.config.validation import describe
 from ensemble.errors import BadInput
-from solver.scene import Model, Scene
+from ensemble.questions import Question, kind_of, kinds, preset_question
+from solver.scene import Model
 
 MAXIMUM_FIELDS = 10  # invalid fields that one message names
-MOST_KNOWN = 256
-LONGEST_KNOWN = 4096  # bytes
+MOST_CACHED = 256
+LONGEST_CACHED = 4096  # bytes
 
 
-class Submission(Model):
-    """What to simulate: a preset by its name, a study or a scene, with changes by dotted path.
+class SubmissionFields(Model):
+    """What every submission may have; `Submission` adds a field for each kind of question.
 
-    Exactly one of `preset`, `study` and `scene` is given. `ranks` is the number of processes of the job,
-    `seconds` the time limit of an attempt. By default a study gets as many ranks as a job may have, a scene
-    one, and either gets the longest time limit.
+    Attributes
+    ----------
+    preset : str or None
+        Name of a preset.
+    set : dict
+        Changes by dotted path.
+    ranks : int or None
+        How many processes the job may use.
+    seconds : float or None
+        Time limit of an attempt.
     """
 
     preset: str | None = None
-    study: Study | None = None
-    scene: Scene | None = None
     set: dict[Annotated[str, Field(max_length=200)], JsonValue] = Field({}, max_length=100)
     ranks: int | None = Field(None, ge=1)
     seconds: float | None = Field(None, gt=0)
 
     @model_validator(mode="after")
     def _one_document(self) -> Self:
-        given = [name for name in ("preset", "study", "scene") if getattr(self, name) is not None]
+        *others, last = names = ("preset", *(kind.kind for kind in kinds()))
+        given = [name for name in names if getattr(self, name) is not None]
         if len(given) != 1:
-            raise ValueError(f"give one of preset, study and scene, not {' and '.join(given) or 'none'}")
+            one_of = f"{', '.join(others)} and {last}"
+            raise ValueError(f"give one of {one_of}, not {' and '.join(given) or 'none'}")
         return self
 
 
+_DOCUMENTS: dict[str, Any] = {kind.kind: (kind.document_type | None, None) for kind in kinds()}
+Submission: type[SubmissionFields] = create_model(
+    "Submission",
+    __base__=SubmissionFields,
+    __doc__=(
+        "What to answer: a preset by its name, or the document of a question under the name of its kind, "
+        "with changes by dotted path. Exactly one of them is given. `ranks` is the number of processes of "
+        "the job, `seconds` the time limit of an attempt. By default a question of many runs gets as many "
+        "ranks as a job may have, a single run one, and either gets the longest time limit."
+    ),
+    **_DOCUMENTS,
+)
+
+
+class Estimate(BaseModel):
+    """Upper bound of the cost of a job, which is refused if it is above the maximum.
+
+    Attributes
+    ----------
+    runs : int
+        How many runs.
+    cost : float
+        Points × vesicles × time to simulate, over all runs.
+    maximum : float
+        The most that a job may cost.
+    accepted : bool
+        Whether the cost is at most the maximum.
+    """
+
+    runs: int
+    cost: float
+    maximum: float
+    accepted: bool
+
+
+def estimate(question: Question[Any], maximum: float) -> Estimate:
+    """Compare the cost of a question with the most that a job may cost.
+
+    Parameters
+    ----------
+    question : Question
+        What the job answers.
+    maximum : float
+        The most that a job may cost.
+
+    Returns
+    -------
+    Estimate
+
+    Raises
+    ------
+    BadInput
+        If a run would record more than it may; names the interval and its least value.
+    """
+    try:
+        cost = question.cost
+    except ValueError as error:
+        raise BadInput(str(error)) from error
+    return Estimate(
+        runs=cost.runs,
+        cost=min(cost.work, sys.float_info.max),  # JSON has no word for infinity
+        maximum=maximum,
+        accepted=cost.work <= maximum,
+    )
+
+
 class PresetDocument(BaseModel):
-    """A study or a scene that ships with the package, with all fields, and its largest cost."""
+    """A preset with all of its fields, and its largest cost.
+
+    Attributes
+    ----------
+    name : str
+    kind : str
+        Which kind of question it asks.
+    document : dict
+    estimate : Estimate
+    """
 
     name: str
-    kind: Kind
+    kind: KindName
     document: dict[str, Any]
     estimate: Estimate
 
 
 @dataclass(frozen=True)
-class Asked:
-    """A submission that has been checked, and what it may cost."""
+class CheckedSubmission:
+    """A submission that has been checked, and what it may cost.
 
-    submission: Submission
-    work: Work
+    Attributes
+    ----------
+    submission : SubmissionFields
+        What was sent.
+    question : Question
+        With the changes made.
+    estimate : Estimate
+        Of its cost.
+    """
+
+    submission: SubmissionFields
+    question: Question[Any]
     estimate: Estimate
 
 
 class Submissions:
     """Checks submissions, in the event loop of a service.
 
-    The latest short ones are kept by what was sent, since many ask for the same preset, or for a cost and
-    then for the job.
+    The latest short ones are cached by their bytes: many clients submit the same preset, or ask for a cost
+    and then for the job.
+
+    Parameters
+    ----------
+    maximum_cost : float
+        The most that a job may cost.
     """
 
     def __init__(self, maximum_cost: float) -> None:
         self._maximum_cost = maximum_cost
-        self._known: LRUCache[bytes, Asked] = LRUCache(MOST_KNOWN)
+        self._cache: LRUCache[bytes, CheckedSubmission] = LRUCache(MOST_CACHED)
 
-    async def read(self, body: bytes) -> Asked:
-        """Return what is asked for.
+    async def read(self, body: bytes) -> CheckedSubmission:
+        """Check a submission.
+
+        Parameters
+        ----------
+        body : bytes
+            JSON.
+
+        Returns
+        -------
+        CheckedSubmission
 
         Raises
         ------
         BadInput
-            If it is nothing that can be done; names the field.
+            If it is not possible; names the field.
         """
-        asked = self._known.get(body)
-        if asked is None:
-            # Elsewhere, since a study may have many points, and a scene many vesicles to find places for.
-            asked = await run_in_threadpool(self._check, body)
-            if len(body) <= LONGEST_KNOWN:
-                self._known[body] = asked
-        return asked
+        checked = self._cache.get(body)
+        if checked is None:
+            # In another thread: a study may have many points, and a scene many vesicles to place.
+            checked = await run_in_threadpool(self._check, body)
+            if len(body) <= LONGEST_CACHED:
+                self._cache[body] = checked
+        return checked
 
-    def _check(self, body: bytes) -> Asked:
+    def _check(self, body: bytes) -> CheckedSubmission:
         submission = read_submission(body)
-        work = requested(submission)
-        return Asked(submission, work, estimate(work.model, self._maximum_cost))
+        question = submitted_question(submission)
+        return CheckedSubmission(submission, question, estimate(question, self._maximum_cost))
 
 
-def read_submission(body: bytes) -> Submission:
-    """Read a submission, strictly: a word is no number, and neither is true or false."""
+def read_submission(body: bytes) -> SubmissionFields:
+    """Read a submission strictly: text and truth values are not taken for numbers.
+
+    Parameters
+    ----------
+    body : bytes
+        JSON.
+
+    Returns
+    -------
+    SubmissionFields
+        A `Submission`.
+
+    Raises
+    ------
+    BadInput
+        If it is too large or not valid; names the fields.
+    """
     try:
         document = from_json(body)
         if isinstance(document, dict):
-            limit_study(document.get("study"))
-            limit_scene(document.get("scene"))
+            for kind in kinds():
+                kind.check_size(document.get(kind.kind))
         return Submission.model_validate_json(body, strict=True)
     except ValidationError as error:
         errors = error.errors(include_url=False)[:MAXIMUM_FIELDS]
@@ -115,39 +236,44 @@ def read_submission(body: bytes) -> Submission:
         raise BadInput(f"body: {error}") from error
 
 
-def requested(submission: Submission) -> Work:
-    """Return the work that a submission asks for, with its changes made.
+def submitted_question(submission: SubmissionFields) -> Question[Any]:
+    """Return the question that a submission asks, with its changes made.
+
+    Parameters
+    ----------
+    submission : SubmissionFields
+        A `Submission`.
+
+    Returns
+    -------
+    Question
 
     Raises
     ------
     BadInput
-        If there is no such preset, or it is no study or scene after the changes; names the field.
+        If there is no such preset, or a change is not possible; names the field.
     """
+    changes = submission.set
     try:
         if submission.preset is not None:
             document = preset_document(submission.preset)
-            _limit(kind_of(document), document, submission.set)
-            return preset_work(submission.preset, submission.set)
-        if submission.study is not None:
-            _limit(Kind.STUDY, submission.study.model_dump(mode="json"), submission.set)
-            return study_work(submission.study, submission.set)
-        assert submission.scene is not None, "a submission has one of the three"
-        _limit(Kind.SCENE, submission.scene.model_dump(mode="json"), submission.set)
-        return scene_work(submission.scene, submission.set)
+            _check_size(kind_of(document), document, changes)
+            return preset_question(submission.preset, changes)
+        (question,) = (
+            kind(getattr(submission, kind.kind))
+            for kind in kinds()
+            if getattr(submission, kind.kind) is not None
+        )
+        _check_size(type(question), question.document.model_dump(mode="json"), changes)
+        return question.changed(changes)
     except ValueError as error:
         raise BadInput(str(error)) from error
 
 
-def kind_of(document: dict[str, Any]) -> Kind:
-    """Tell a document of a study, which has a search, from that of a scene."""
-    return Kind.STUDY if "search" in document else Kind.SCENE
-
-
-def _limit(kind: Kind, document: dict[str, Any], changes: Mapping[str, Any]) -> None:
+def _check_size(kind: type[Question[Any]], document: dict[str, Any], changes: Mapping[str, Any]) -> None:
     """Refuse a document that is too large with these changes."""
-    limit = limit_study if kind is Kind.STUDY else limit_scene
-    # To change the vesicles of an arrangement they have to be found places first, which takes its time.
+    # To change the vesicles of an arrangement it has to be placed first, so its own size is checked before.
     others = {path: changes[path] for path in changes if "vesicles" not in path.split(".")}
-    limit(override(document, others))
+    kind.check_size(override(document, others))
     if len(others) < len(changes):
-        limit(override(document, changes))
+        kind.check_size(override(document, changes))

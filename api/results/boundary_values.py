@@ -13,7 +13,7 @@ from pydantic import BaseModel
 
 from ensemble.errors import BadInput
 from ensemble.search.boundary import Boundary, BoundaryPoint
-from ensemble.search.critical_value import Status
+from ensemble.search.critical_value import SearchStatus
 from ensemble.search.line import Line, line_through
 
 CACHED_BOUNDARIES = 256  # documents that are kept as they were sent
@@ -136,7 +136,7 @@ def _converged_points(boundary: Boundary, name: str) -> list[_ConvergedPoint]:
     points = [
         _ConvergedPoint(point.parameters[name], point.critical_value, low, high, point)
         for point in boundary.points
-        if point.status == Status.CONVERGED and point.critical_value is not None
+        if point.status == SearchStatus.CONVERGED and point.critical_value is not None
         for low, high in [point.bracket]
         if low is not None and high is not None
     ]

@@ -17,9 +17,8 @@ from api.http.caching import json_response
 from api.http.openapi import reference
 from api.http.paging import CollectionPage, Limit, page_response
 from api.http.problems import Problem, documented
-from api.jobs.cost_estimate import Estimate
-from api.jobs.job import Job, JobStatus, Kind, NoSuchJob, TooManyJobs
-from api.jobs.submissions import Asked, Submission
+from api.jobs.job import Job, JobStatus, NoSuchJob, TooManyJobs
+from api.jobs.submissions import CheckedSubmission, Estimate, Submission
 from api.routes.service import Reader, Service, Submitter
 from api.settings import Settings
 from ensemble.errors import BadInput
@@ -128,27 +127,27 @@ async def submit_job(
         If the job is too large, or its owner has too many unfinished jobs.
     """
     service = submitter.service
-    asked = await service.submissions.read(body)
-    ranks, seconds = _resources(service.settings, asked)
-    offer = service.jobs.offer(
-        asked.work, submitter.user, ranks, seconds, idempotency_key, service.settings.maximum_jobs
+    checked = await service.submissions.read(body)
+    ranks, seconds = _resources(service.settings, checked)
+    pending = service.jobs.submit(
+        checked.question, submitter.user, ranks, seconds, idempotency_key, service.settings.maximum_jobs
     )
     # Awaited through `wait`: if the client disconnects, the transaction, which other jobs share, goes on.
-    await asyncio.wait([asyncio.wrap_future(offer.accepted)])
+    await asyncio.wait([asyncio.wrap_future(pending.accepted)])
     try:
-        submitted = await service.look_up(service.jobs.settled, offer)
+        result = await service.look_up(service.jobs.result, pending)
     except TooManyJobs as error:
         raise Problem(HTTPStatus.TOO_MANY_REQUESTS, str(error)) from error
-    response = json_response(submitted.job)
+    response = json_response(result.job)
     response.status_code = HTTPStatus.ACCEPTED
     # Relative to the address of the request, for proxies that add a prefix.
-    response.headers["Location"] = f"jobs/{submitted.job.id}"
+    response.headers["Location"] = f"jobs/{result.job.id}"
     return response
 
 
-def _resources(settings: Settings, asked: Asked) -> tuple[int, float]:
+def _resources(settings: Settings, checked: CheckedSubmission) -> tuple[int, float]:
     """Return the number of ranks of a job and the time limit of an attempt, in seconds."""
-    cost = asked.estimate
+    cost = checked.estimate
     if not cost.accepted:
         raise Problem(
             HTTPStatus.UNPROCESSABLE_ENTITY,
@@ -157,8 +156,8 @@ def _resources(settings: Settings, asked: Asked) -> tuple[int, float]:
             cost=cost.cost,
             maximum=cost.maximum,
         )
-    ranks = asked.submission.ranks or (settings.maximum_ranks if asked.work.kind is Kind.STUDY else 1)
-    seconds = asked.submission.seconds or settings.maximum_seconds
+    ranks = checked.submission.ranks or (settings.maximum_ranks if checked.question.has_many_runs else 1)
+    seconds = checked.submission.seconds or settings.maximum_seconds
     if ranks > settings.maximum_ranks:
         raise BadInput(f"ranks: {ranks} — must be at most {settings.maximum_ranks}")
     if seconds > settings.maximum_seconds:

@@ -6,11 +6,10 @@ from fastapi import APIRouter
 from pydantic import TypeAdapter
 
 from api.http.paging import CollectionPage
-from api.jobs.cost_estimate import estimate
-from api.jobs.job import preset_work
-from api.jobs.submissions import PresetDocument
+from api.jobs.submissions import PresetDocument, estimate
 from api.routes.service import Reader
 from ensemble.config.documents import preset_document, preset_names
+from ensemble.questions import preset_question
 from solver.scene.arrangement import Arrangement
 
 router = APIRouter(prefix="/presets", tags=["presets"])
@@ -33,8 +32,8 @@ def list_presets(reader: Reader) -> CollectionPage[PresetDocument]:
 
 
 def _preset(name: str, maximum_cost: float) -> PresetDocument:
-    work = preset_work(name, {})
-    document = work.document
+    question = preset_question(name, {})
+    document = question.fields
     arrangement = preset_document(name).get("arrangement")
     if arrangement is not None:  # its few fields are easier to change than the vesicles made from it
         complete = TypeAdapter(Arrangement).dump_python(
@@ -43,5 +42,5 @@ def _preset(name: str, maximum_cost: float) -> PresetDocument:
         document = {key: value for key, value in document.items() if key != "vesicles"}
         document["arrangement"] = complete
     return PresetDocument(
-        name=name, kind=work.kind, document=document, estimate=estimate(work.model, maximum_cost)
+        name=name, kind=question.kind, document=document, estimate=estimate(question, maximum_cost)
     )

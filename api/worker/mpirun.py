@@ -15,7 +15,7 @@ from typing import IO, TextIO
 
 from pydantic import ValidationError
 
-from ensemble.cli.progress import ProgressLine
+from ensemble.display.progress_line import ProgressLine
 from ensemble.errors import BadInput
 
 _END_SECONDS = 5.0

@@ -20,13 +20,13 @@ _DECIMAL = Context(prec=34)
 class GeometricGrid:
     """Values 10^(index/points_per_decade), so index 0 is the origin 1.0.
 
-    There are the fewest points per decade that bring neighbors closer than the tolerance:
+    There are just as many points per decade as bring neighbors closer than the tolerance:
     (high − low)/low < tolerance.
 
     Attributes
     ----------
     tolerance : float
-        Relative distance that neighbors must stay below, > 0.
+        Relative distance that neighbors stay below, > 0.
 
     Raises
     ------
@@ -46,15 +46,47 @@ class GeometricGrid:
         return math.floor(math.log(10) / math.log1p(self.tolerance)) + 1
 
     def value(self, index: int) -> float:
-        """Return the value at this index."""
+        """Return the value at an index.
+
+        Parameters
+        ----------
+        index : int
+            Any integer.
+
+        Returns
+        -------
+        float
+            The same to the last bit on every machine.
+        """
         return float(_DECIMAL.power(10, _DECIMAL.divide(index, self.points_per_decade)))
 
     def nearest(self, value: float) -> int:
-        """Return the index of the grid value with the ratio closest to 1 to this value (> 0)."""
+        """Return the index of the grid value whose ratio to a value is closest to 1.
+
+        Parameters
+        ----------
+        value : float
+            Positive.
+
+        Returns
+        -------
+        int
+            Index of the grid value.
+        """
         return round(self.points_per_decade * math.log10(value))
 
     def index(self, value: float) -> int:
         """Return the index of a value on the grid.
+
+        Parameters
+        ----------
+        value : float
+            A value of this grid.
+
+        Returns
+        -------
+        int
+            Its index.
 
         Raises
         ------
@@ -68,6 +100,17 @@ class GeometricGrid:
         raise ValueError(f"{value!r} is not on the grid of {self.points_per_decade} values a decade from 1.0")
 
     def within(self, low: float, high: float) -> range:
-        """Return the indices of all values in [low, high], both > 0."""
+        """Return the indices of all values in an interval.
+
+        Parameters
+        ----------
+        low, high : float
+            Its ends, which belong to it, both positive.
+
+        Returns
+        -------
+        range
+            Indices, ascending.
+        """
         first, last = self.nearest(low), self.nearest(high)
         return range(first + (self.value(first) < low), last + 1 - (self.value(last) > high))

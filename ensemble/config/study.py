@@ -30,34 +30,48 @@ Interval = Annotated[tuple[Positive, Positive], AfterValidator(_ascending)]
 
 
 class Guess(Model):
-    """Where the boundary is expected at one value of the sweep.
+    """Where the boundary is expected at one value of the sweep: it saves runs and changes no answer.
 
-    A guess saves runs and changes no answer.
+    Attributes
+    ----------
+    at : float
+        Value of the swept parameter.
+    bracket : (float, float)
+        Values of the searched parameter between which the boundary is expected.
     """
 
     at: float
-    """Value of the swept parameter."""
     bracket: Interval
-    """Values of the searched parameter between which the boundary is expected."""
 
 
 class Search(Model):
-    """Which critical value is searched for: of what, within which limits, between which outcomes."""
+    """Which critical value is searched for: of what, within which limits, between which outcomes.
+
+    Attributes
+    ----------
+    parameter : str
+        Dotted path, in the scene, of the number whose critical value is searched for.
+    tolerance : float
+        Relative width that the bracket stays below, from 1e-9 to 0.5.
+    limits : (float, float)
+        Least and greatest value that may be tried, above 0.
+    guesses : tuple of Guess
+        Where the boundary is expected, until two of its points are known.
+    low : tuple of Outcome
+        Outcomes below the critical value.
+    high : tuple of Outcome
+        Outcomes above the critical value.
+    certify : bool
+        Whether both ends of every bracket are run again at finer numerics.
+    """
 
     parameter: str
-    """Dotted path, in the scene, of the number whose critical value is searched for."""
     tolerance: float = Field(0.01, ge=1e-9, le=0.5)
-    """Relative width that the bracket stays below."""
     limits: Interval
-    """Least and greatest value that is tried."""
     guesses: tuple[Guess, ...] = ()
-    """Where the boundary is expected, until two of its points are known."""
     low: tuple[Outcome, ...] = Field(min_length=1)
-    """Outcomes below the critical value."""
     high: tuple[Outcome, ...] = Field(min_length=1)
-    """Outcomes above the critical value."""
     certify: bool = False
-    """Whether both ends of every bracket are run again at finer numerics."""
 
     @field_validator("limits")
     @classmethod
@@ -88,12 +102,18 @@ class Search(Model):
 
 
 class Sweep(Model):
-    """Along which parameter, and at which of its values, the boundary is traced."""
+    """Along which parameter, and at which of its values, the boundary is traced.
+
+    Attributes
+    ----------
+    parameter : str
+        Dotted path, in the scene, of the number that is swept.
+    values : tuple of float
+        Values of this number; at each of them one point of the boundary is searched for.
+    """
 
     parameter: str
-    """Dotted path, in the scene, of the number that is swept."""
     values: tuple[float, ...] = Field(min_length=1)
-    """Values of this number; one point of the boundary is searched for at each."""
 
     @field_validator("values")
     @classmethod
@@ -104,16 +124,24 @@ class Sweep(Model):
 
 
 class Study(Model):
-    """A boundary between outcomes, traced from a base scene in two of its parameters."""
+    """A boundary between outcomes, traced from a base scene in two of its parameters.
+
+    Attributes
+    ----------
+    name : str
+        What the study and its boundary are called.
+    scene : Scene
+        The scene in which both parameters are varied.
+    search : Search
+        The critical value that is searched for at each value of the sweep.
+    sweep : Sweep
+        The values at which it is searched for.
+    """
 
     name: Annotated[str, Field(min_length=1)]
-    """What the study and its boundary are called."""
     scene: Scene
-    """The scene in which both parameters are varied."""
     search: Search
-    """The critical value that is searched for at each value of the sweep."""
     sweep: Sweep
-    """The values at which it is searched for."""
 
     @model_validator(mode="after")
     def _parameters_fit_the_scene(self) -> Self:

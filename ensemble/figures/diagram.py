@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from ensemble.figures.style import BLACK, GRAY, MARKS, STYLE, WIDTH
 from ensemble.figures.symbols import Quantity, describe, quantity
 from ensemble.search.boundary import Boundary, BoundaryPoint
-from ensemble.search.critical_value import Status
+from ensemble.search.critical_value import SearchStatus
 from ensemble.search.line import Line, line_through
 from solver.analysis.run import Array, Outcome
 from solver.scene import Scene
@@ -48,7 +48,7 @@ def phase_diagram(boundary: Boundary, runs: Sequence[tuple[float, float, Outcome
     if bracketed:
         _draw_brackets(axes, bracketed, swept)
         _draw_boundary(axes, bracketed, swept, y)
-    converged = [point for point in bracketed if point.status == Status.CONVERGED]
+    converged = [point for point in bracketed if point.status == SearchStatus.CONVERGED]
     if (line := line_through(boundary)) is not None:
         _draw_fit(axes, line, [point.parameters[swept] for point in converged], x, y)
     axes.margins(0.06)

@@ -1,9 +1,9 @@
 """Makes the runs of a task queue on all groups of ranks.
 
 Every rank simulates, together with the others of its group.  Rank 0 also runs the dispatcher, in a thread
-beside its own simulations: it alone decides what is run next and alone writes to the database, so ranks
-never contend for either.  All leaders of groups, rank 0 and one that is alone included, talk to it by the
-same messages, and pass orders on to their group.
+beside its own simulations.  Only the dispatcher decides what is run next and only it writes to the database,
+so ranks never contend for either.  The leaders of all groups exchange the same messages with it, rank 0 and
+the leader of a group of one included, and pass orders on to their group.
 
 A blocking receive would spin and take the core from the simulation, so both sides poll with short sleeps.
 """
@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, cast
 
 from ensemble.mpi.groups import Groups
-from ensemble.mpi.usage import RunUsage, Usage
+from ensemble.mpi.usage import RunUsage, UsageMeter
 from ensemble.mpi.world import abort_guard
 from ensemble.search.task_queue import SomeTask, Task, TaskQueue
 
@@ -36,7 +36,13 @@ _CANCEL_CHECK_SECONDS = 0.02
 
 @dataclass(frozen=True)
 class Cancel:
-    """Order: stop the run of this key, if it is still going on."""
+    """Order: stop a run, if it is still going on.
+
+    Attributes
+    ----------
+    key : str
+        Of the run.
+    """
 
     key: str
 
@@ -53,7 +59,17 @@ class Ready:
 
 @dataclass(frozen=True)
 class Finished:
-    """Report: the run is staged; simulating it took `seconds`."""
+    """Report: a run is finished and staged.
+
+    Attributes
+    ----------
+    staged : Staged
+        To be committed by the dispatcher.
+    outcome : Outcome
+        Of the run.
+    seconds : float
+        That it took to simulate.
+    """
 
     staged: Staged
     outcome: Outcome
@@ -62,28 +78,58 @@ class Finished:
 
 @dataclass(frozen=True)
 class Stopped:
-    """Report: the run was cancelled after `seconds`."""
+    """Report: a run was cancelled.
+
+    Attributes
+    ----------
+    seconds : float
+        After which it was.
+    """
 
     seconds: float
 
 
 Order = Task | Cancel | Stop
-Report = Ready | Finished | Stopped
+WorkerReport = Ready | Finished | Stopped
 
 
 @dataclass(frozen=True)
 class JobProgress(Generic[SomeTask]):
-    """How far a task queue has come."""
+    """How far a task queue has come.
 
-    running: Mapping[int, SomeTask]  # by the rank of the group's leader among all leaders
-    runs: int  # finished so far, without those that the store already had
-    known: int  # answers that the store already had
-    elapsed: float  # seconds
-    seconds_left: float | None  # estimate, None before the first run is finished
+    Attributes
+    ----------
+    running : mapping from int to Task
+        Tasks that are being carried out, by the rank of the group's leader among all leaders.
+    runs : int
+        How many runs have been made, without those that the store had already.
+    known : int
+        How many answers the store had already.
+    elapsed : float
+        Seconds since the start.
+    seconds_left : float or None
+        An estimate; None before the first run is finished.
+    """
+
+    running: Mapping[int, SomeTask]
+    runs: int
+    known: int
+    elapsed: float
+    seconds_left: float | None
 
 
 def work(groups: Groups, store: StoreOnRank) -> None:
-    """Simulate what the dispatcher orders until it says stop; all ranks do."""
+    """Simulate what the dispatcher orders until it says stop.
+
+    Collective.
+
+    Parameters
+    ----------
+    groups : Groups
+        This rank's view of them.
+    store : Store or RunStaging
+        Where finished runs are staged.
+    """
     with abort_guard(groups.everyone):
         if groups.leaders is None:
             _follow(groups)
@@ -119,7 +165,7 @@ def _wait(communicator: Intracomm) -> Order:
     return cast(Order, received[0])
 
 
-def _simulate(groups: Groups, leaders: Intracomm, store: StoreOnRank, task: Task) -> Report:
+def _simulate(groups: Groups, leaders: Intracomm, store: StoreOnRank, task: Task) -> WorkerReport:
     # A study whose answers are all in the store never needs the compiled kernels.
     from solver.simulation.simulate import Cancelled, simulate
 
@@ -133,7 +179,7 @@ def _simulate(groups: Groups, leaders: Intracomm, store: StoreOnRank, task: Task
 
 
 class _Cancellation:
-    """Whether the run of this key has been cancelled; asks MPI only every few steps."""
+    """Whether a run has been cancelled; looks for messages only every few steps."""
 
     def __init__(self, communicator: Intracomm, key: str) -> None:
         self._communicator = communicator
@@ -157,13 +203,15 @@ class Dispatcher(Generic[SomeTask]):
     Parameters
     ----------
     communicator : Intracomm
-        The leaders of all groups, all ranks of which `work` meanwhile.
+        The leaders of all groups; all ranks of these groups `work` meanwhile.
     queue : TaskQueue
+        Decides what is run.
     store : Store
+        Where runs are committed.
     on_change : callable
-        Called whenever an outcome or an assignment changed something.
-    usage : Usage
-        Takes down what the groups do.
+        Called with the progress whenever an outcome or an assignment changed something.
+    meter : UsageMeter
+        Measures what the groups do.
     """
 
     def __init__(
@@ -172,52 +220,52 @@ class Dispatcher(Generic[SomeTask]):
         queue: TaskQueue[SomeTask],
         store: Store,
         on_change: Callable[[JobProgress[SomeTask]], None],
-        usage: Usage,
+        meter: UsageMeter,
     ) -> None:
         self._communicator = communicator
         self._queue = queue
         self._store = store
         self._on_change = on_change
-        self._usage = usage
+        self._meter = meter
         self._running: dict[int, SomeTask] = {}
         self._idle: set[int] = set()
         self._cancelled: set[str] = set()
         self._runs = 0
 
     def run(self) -> RunUsage:
-        """Dispatch from the first report to the last order."""
+        """Dispatch from the first report to the last order, and return what it took."""
         while len(self._idle) < self._communicator.Get_size() or not self._queue.done:
             report, rank = self._wait()
             self._take(report, rank)
-            self._cancel_pointless()
+            self._cancel_unneeded()
             self._assign()
             self._on_change(self._progress())
         for rank in self._idle:
             _send(self._communicator, Stop(), rank, _ORDERS)
-        return RunUsage(self._runs, self._usage.elapsed, self._usage.fractions())
+        return RunUsage(self._runs, self._meter.elapsed, self._meter.fractions())
 
-    def _wait(self) -> tuple[Report, int]:
+    def _wait(self) -> tuple[WorkerReport, int]:
         while (received := _receive(self._communicator, _REPORTS)) is None:
             time.sleep(_POLL_SECONDS)
-        return cast(tuple[Report, int], received)
+        return cast(tuple[WorkerReport, int], received)
 
-    def _take(self, report: Report, rank: int) -> None:
+    def _take(self, report: WorkerReport, rank: int) -> None:
         match report:
             case Finished(staged, outcome, seconds):
                 task = self._running.pop(rank)
                 self._store.commit(staged)
                 self._queue.answer(task, outcome)
                 self._runs += 1
-                self._usage.ran(rank, seconds)
+                self._meter.record_run(rank, seconds)
             case Stopped(seconds):
                 self._queue.cancelled(self._running.pop(rank))
-                self._usage.ran(rank, seconds)
+                self._meter.record_run(rank, seconds)
         self._idle.add(rank)
 
-    def _cancel_pointless(self) -> None:
-        pointless = {task.key for task in self._queue.pointless_tasks()}
+    def _cancel_unneeded(self) -> None:
+        unneeded = {task.key for task in self._queue.unneeded_tasks()}
         for rank, task in self._running.items():
-            if task.key in pointless - self._cancelled:
+            if task.key in unneeded - self._cancelled:
                 _send(self._communicator, Cancel(task.key), rank, _ORDERS)
                 self._cancelled.add(task.key)
 
@@ -230,24 +278,24 @@ class Dispatcher(Generic[SomeTask]):
             self._running[rank] = task
             self._idle.remove(rank)
             _send(self._communicator, task, rank, _ORDERS)
-        self._usage.idle(len(self._idle))
+        self._meter.record_idle(len(self._idle))
 
     def _progress(self) -> JobProgress[SomeTask]:
         return JobProgress(
             running=dict(self._running),
             runs=self._runs,
             known=self._queue.known_answers,
-            elapsed=self._usage.elapsed,
+            elapsed=self._meter.elapsed,
             seconds_left=self._seconds_left(),
         )
 
     def _seconds_left(self) -> float | None:
-        if self._usage.mean_run is None:
+        if self._meter.mean_run is None:
             return None
-        return self._usage.mean_run * self._queue.runs_left / self._communicator.Get_size()
+        return self._meter.mean_run * self._queue.runs_left / self._communicator.Get_size()
 
 
-def _send(communicator: Intracomm, message: Order | Report, rank: int, tag: int) -> None:
+def _send(communicator: Intracomm, message: Order | WorkerReport, rank: int, tag: int) -> None:
     communicator.send(message, dest=rank, tag=tag)
 
 

@@ -1,8 +1,8 @@
-"""A world of ranks as groups, each of which computes one run at a time together.
+"""Groups of ranks, each of which computes one run at a time together.
 
-The first rank of a group is its leader: it alone talks to the dispatcher, stages results and decides whether
-a run goes on; the others follow it.  The last group is smaller where the ranks do not divide evenly, so no
-rank is left over.
+The first rank of a group is its leader.  Only the leader exchanges messages with the dispatcher, stages
+results and decides whether a run goes on; the others follow it.  If the ranks do not divide evenly, the last
+group is smaller, so that no rank is left over.
 """
 
 from __future__ import annotations
@@ -43,9 +43,21 @@ class Groups:
 
     @classmethod
     def of(cls, communicator: Intracomm, ranks_per_run: int) -> Self:
-        """Split a communicator into groups of this many neighboring ranks.
+        """Split a communicator into groups of neighboring ranks.
 
         Collective.
+
+        Parameters
+        ----------
+        communicator : Intracomm
+            All ranks.
+        ranks_per_run : int
+            How many ranks a group has, at least 1.
+
+        Returns
+        -------
+        Groups
+            This rank's view of them.
 
         Raises
         ------
@@ -81,9 +93,21 @@ class Groups:
 
 
 def split(communicator: Intracomm, color: int | None) -> Intracomm | None:
-    """Return the communicator of all ranks of the same color, in the same order; None without a color.
+    """Return the communicator of all ranks that give the same color, in the same order.
 
     Collective.
+
+    Parameters
+    ----------
+    communicator : Intracomm
+        The ranks that are split.
+    color : int or None
+        Of this rank.
+
+    Returns
+    -------
+    Intracomm or None
+        None for a rank without a color.
     """
     from mpi4py import MPI
 
@@ -93,6 +117,18 @@ def split(communicator: Intracomm, color: int | None) -> Intracomm | None:
 
 def checked_ranks(ranks_per_run: int, size: int) -> int:
     """Return the number of ranks for a run, if it is possible.
+
+    Parameters
+    ----------
+    ranks_per_run : int
+        How many ranks are to compute a run together.
+    size : int
+        How many there are.
+
+    Returns
+    -------
+    int
+        The same number.
 
     Raises
     ------
@@ -104,26 +140,32 @@ def checked_ranks(ranks_per_run: int, size: int) -> int:
     return ranks_per_run
 
 
-def chosen_ranks(asked: str, scene: Scene, size: int) -> int:
-    """Return how many of ``size`` ranks compute a run together: what is asked for, or what pays off.
+def chosen_ranks(requested: str, scene: Scene, size: int) -> int:
+    """Return how many ranks compute a run together: as many as are requested, or as pay off.
 
     Parameters
     ----------
-    asked : str
+    requested : str
         A number, or ``auto``.
     scene : Scene
         That is run.
     size : int
+        How many ranks there are.
+
+    Returns
+    -------
+    int
+        From 1 to `size`.
 
     Raises
     ------
     BadInput
         If it is neither, or not possible.
     """
-    if asked == AUTOMATIC:
+    if requested == AUTOMATIC:
         return recommended_ranks(scene, size)
     try:
-        number = int(asked)
+        number = int(requested)
     except ValueError:
-        raise BadInput(f"--ranks-per-run: {asked!r} — must be a number of ranks or {AUTOMATIC}") from None
+        raise BadInput(f"--ranks-per-run: {requested!r} — must be a number of ranks or {AUTOMATIC}") from None
     return checked_ranks(number, size)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, TypeVar, cast
 from ensemble.mpi.dispatcher import Dispatcher, JobProgress, work
 from ensemble.mpi.groups import Groups
 from ensemble.mpi.store_on_ranks import whole_store
-from ensemble.mpi.usage import RunUsage, Usage
+from ensemble.mpi.usage import RunUsage, UsageMeter
 from ensemble.mpi.world import abort_guard
 from ensemble.search.batch import Batch
 from ensemble.search.point_search import SearchRun
@@ -31,7 +31,15 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True)
 class Snapshot:
-    """Where a study stands."""
+    """How far a study has come.
+
+    Attributes
+    ----------
+    boundary : Boundary
+        As far as it is known.
+    progress : JobProgress
+        Of the runs.
+    """
 
     boundary: Boundary
     progress: JobProgress[SearchRun]
@@ -39,10 +47,18 @@ class Snapshot:
 
 @dataclass(frozen=True)
 class StudyResult:
-    """A study's result, and what it cost."""
+    """The boundary of a study, and what it took to trace it.
+
+    Attributes
+    ----------
+    boundary : Boundary
+        With the final status of every point.
+    usage : RunUsage
+        Of the ranks.
+    """
 
     boundary: Boundary
-    cost: RunUsage
+    usage: RunUsage
 
 
 def run_study(
@@ -52,7 +68,7 @@ def run_study(
     on_change: Callable[[Snapshot], None],
     ranks_per_run: int = 1,
 ) -> StudyResult:
-    """Trace the boundary of a study, running what the store does not have.
+    """Trace the boundary of a study, making the runs that the store does not have.
 
     Collective.
 
@@ -61,16 +77,17 @@ def run_study(
     communicator : Intracomm
         Its MPI library must provide MPI_THREAD_MULTIPLE.  Any exception on any rank aborts it.
     study : Study
-    store : Store
-        The same on every rank; rank 0 commits.
+        The same on every rank.
+    store : Store or RunStaging
+        From `store_on_ranks`; rank 0 commits.
     on_change : callable
-        Called on rank 0, in the coordinator's thread, whenever an answer or an assignment changed something.
+        Called on rank 0, in the dispatcher's thread, whenever an outcome or an assignment changed something.
     ranks_per_run : int
         How many ranks compute a run together.
 
     Returns
     -------
-    Traced
+    StudyResult
         On every rank.
     """
 
@@ -83,8 +100,8 @@ def run_study(
         whole_store(store).save_boundary(boundary)
         on_change(Snapshot(boundary, progress))
 
-    boundary, cost = carry_out(communicator, ranks_per_run, store, begin, publish, StudyPlanner.boundary)
-    return StudyResult(boundary, cost)
+    boundary, usage = run_queue(communicator, ranks_per_run, store, begin, publish, StudyPlanner.boundary)
+    return StudyResult(boundary, usage)
 
 
 def run_batch(
@@ -96,14 +113,27 @@ def run_batch(
 ) -> RunUsage:
     """Run independent scenes, as far as the store does not have their runs.
 
-    Collective; parameters as for `run_study`.  A run that fails numerically is made and kept like any other.
+    Collective.  A run that fails numerically is made and kept like any other.
+
+    Parameters
+    ----------
+    communicator : Intracomm
+        Its MPI library must provide MPI_THREAD_MULTIPLE.  Any exception on any rank aborts it.
+    scenes : iterable of Scene
+        What is run; it is read on rank 0.
+    store : Store or RunStaging
+        From `store_on_ranks`; rank 0 commits.
+    on_change : callable
+        Called on rank 0, in the dispatcher's thread, whenever an outcome or an assignment changed something.
+    ranks_per_run : int
+        How many ranks compute a run together.
 
     Returns
     -------
-    Cost
+    RunUsage
         On every rank.
     """
-    _, cost = carry_out(
+    _, usage = run_queue(
         communicator,
         ranks_per_run,
         store,
@@ -111,13 +141,13 @@ def run_batch(
         publish=lambda batch, progress: on_change(progress),
         conclude=lambda batch: None,
     )
-    return cost
+    return usage
 
 
 SomeTaskQueue = TypeVar("SomeTaskQueue", bound=TaskQueue)
 
 
-def carry_out(
+def run_queue(
     communicator: Intracomm,
     ranks_per_run: int,
     store: StoreOnRank,
@@ -125,40 +155,52 @@ def carry_out(
     publish: Callable[[SomeTaskQueue, JobProgress], None],
     conclude: Callable[[SomeTaskQueue], Result],
 ) -> tuple[Result, RunUsage]:
-    """Make the runs of a task queue; every rank gets what rank 0 concludes from it, and what it cost.
+    """Make the runs of a task queue.
 
     Collective.
 
     Parameters
     ----------
-    communicator, ranks_per_run, store
-        As for `run_study`.
+    communicator : Intracomm
+        Its MPI library must provide MPI_THREAD_MULTIPLE.  Any exception on any rank aborts it.
+    ranks_per_run : int
+        How many ranks compute a run together.
+    store : Store or RunStaging
+        From `store_on_ranks`; rank 0 commits.
     begin : callable
-        Returns the queue, on rank 0.
+        Returns the queue; called on rank 0.
     publish : callable
-        Called as ``on_change`` of `run_study` is, with the queue.
+        Called on rank 0, in the dispatcher's thread, with the queue and its progress, whenever an outcome or
+        an assignment changed something.
     conclude : callable
-        Returns what is wanted of the queue once it is done; it is pickled.
+        Returns what is wanted of the queue once it is done; called on rank 0.  What it returns is pickled.
+
+    Returns
+    -------
+    result : object
+        What `conclude` returned, on every rank.
+    usage : RunUsage
+        On every rank.
     """
     groups = Groups.of(communicator, ranks_per_run)
     everyone, leaders = groups.everyone, groups.leaders
 
-    def coordinate(leaders: Intracomm) -> tuple[Result, RunUsage]:
+    def dispatch(leaders: Intracomm) -> tuple[Result, RunUsage]:
         with abort_guard(everyone):
-            usage = Usage(leaders.Get_size(), time.perf_counter)
+            meter = UsageMeter(leaders.Get_size(), time.perf_counter)
             queue = begin()
             dispatcher = Dispatcher(
-                leaders, queue, whole_store(store), lambda progress: publish(queue, progress), usage
+                leaders, queue, whole_store(store), lambda progress: publish(queue, progress), meter
             )
-            cost = dispatcher.run()
-            return conclude(queue), cost
+            usage = dispatcher.run()
+            return conclude(queue), usage
 
     result: tuple[Result, RunUsage] | None = None
     if leaders is not None and leaders.Get_rank() == 0:
-        with ThreadPoolExecutor(1, "coordinator") as beside:
-            coordination = beside.submit(coordinate, leaders)
+        with ThreadPoolExecutor(1, "dispatcher") as thread:
+            dispatching = thread.submit(dispatch, leaders)
             work(groups, store)
-            result = coordination.result()
+            result = dispatching.result()
     else:
         work(groups, store)
     result = everyone.bcast(result)

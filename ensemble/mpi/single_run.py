@@ -1,102 +1,82 @@
-"""One run, made by as many ranks together as there are, unless the store has it."""
+"""One run, made by several ranks together, unless the store has it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from contextlib import AbstractContextManager, ExitStack
-from pathlib import Path
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from ensemble.config.documents import load_scene
 from ensemble.config.run_key import run_key
-from ensemble.errors import refusing
-from ensemble.mpi.groups import chosen_ranks, split
-from ensemble.mpi.world import abort_guard, launched_size, on_root, world
-from ensemble.store.run_record import RunSummary
+from ensemble.mpi.groups import split
+from ensemble.mpi.store_on_ranks import whole_store
+from ensemble.mpi.world import on_root
 from solver.scene import Scene
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
 
-    from ensemble.store import Store
+    from ensemble.mpi.store_on_ranks import StoreOnRank
+    from ensemble.store.run_record import RunSummary
     from solver.parallel import Parallel
-
-Progress = AbstractContextManager[Callable[[float, float], None]]
 
 
 def single_run(
-    name_or_path: str,
-    changes: Iterable[str],
-    store: Path | None,
-    ranks_per_run: str | None,
-    progress: Progress,
+    communicator: Intracomm | None,
+    scene: Scene,
+    store: StoreOnRank | None,
+    ranks: int,
+    on_progress: Callable[[float, float], None],
 ) -> RunSummary | None:
-    """Make the run of a scene.
+    """Make the run of a scene, unless the store has it.
 
-    Collective where a launcher has started several processes; alone, no MPI library is needed.
+    Collective.
 
     Parameters
     ----------
-    name_or_path : str
-        Of a scene.
-    changes : iterable of str
-        As `ensemble.config.documents.load_scene` takes them.
-    store : Path or None
-        Directory of the store that keeps the run.
-    ranks_per_run : str or None
-        As `ensemble.mpi.groups.chosen_ranks` takes it; None: all ranks.
-    progress : context manager
-        Gives a function that is told the time reached and the latest time, on the first rank.
+    communicator : Intracomm or None
+        All ranks; None if this process is alone.
+    scene : Scene
+        The same on every rank.
+    store : Store or RunStaging or None
+        From `store_on_ranks`; None if no store keeps the run.
+    ranks : int
+        How many ranks compute the run together.
+    on_progress : callable
+        Called on the first rank with the time that is reached and the latest end.
 
     Returns
     -------
-    RunSummary
+    RunSummary or None
         On the first rank; None elsewhere.
-
-    Raises
-    ------
-    BadInput
-        On every rank, before any work starts.
     """
-    with ExitStack() as stack:
-        communicator = world() if launched_size() > 1 else None
-        size = 1
-        if communicator is not None:
-            stack.enter_context(abort_guard(communicator))
-            size = communicator.Get_size()
-        keep: Store | None = None
 
-        def prepare() -> RunSummary | tuple[Scene, int]:
-            nonlocal keep
-            with refusing():
-                scene = load_scene(name_or_path, changes)
-                ranks = chosen_ranks(str(size) if ranks_per_run is None else ranks_per_run, scene, size)
-                keep = None if store is None else stack.enter_context(_opened(store))
-            if keep is not None and keep.contains(run_key(scene)):
-                return keep.summary(run_key(scene))
-            return scene, ranks
-
-        prepared = on_root(communicator, prepare)
-        first = communicator is None or communicator.Get_rank() == 0
-        if isinstance(prepared, RunSummary):
-            return prepared if first else None
-        scene, ranks = prepared
-        parallel = _together(communicator, ranks)
-        if parallel is None:
+    def stored() -> RunSummary | None:
+        if store is None:
             return None
+        key, kept = run_key(scene), whole_store(store)
+        return kept.summary(key) if kept.contains(key) else None
 
-        from solver.simulation.simulate import simulate
+    is_first = communicator is None or communicator.Get_rank() == 0
+    summary = on_root(communicator, stored)
+    if summary is not None:
+        return summary if is_first else None
+    parallel = _first_ranks(communicator, ranks)
+    if parallel is None:
+        return None
 
-        run = simulate(scene, parallel=parallel, on_progress=stack.enter_context(progress) if first else None)
-        if not first:
-            return None
-        if keep is not None:
-            keep.save(run)
-        return RunSummary.of(run)
+    from ensemble.store.run_record import RunSummary
+    from solver.simulation.simulate import simulate
+
+    run = simulate(scene, parallel=parallel, on_progress=on_progress if is_first else None)
+    if not is_first:
+        return None
+    summary = RunSummary.of(run)
+    if store is not None:
+        whole_store(store).save(run, summary)
+    return summary
 
 
-def _together(communicator: Intracomm | None, ranks: int) -> Parallel | None:
-    """The first ranks of a communicator, which compute the run; None on the others."""
+def _first_ranks(communicator: Intracomm | None, ranks: int) -> Parallel | None:
+    """How the first ranks of a communicator compute a run together; None on the others."""
     from ensemble.mpi.ranks import Ranks
     from solver.parallel import SERIAL
 
@@ -106,9 +86,3 @@ def _together(communicator: Intracomm | None, ranks: int) -> Parallel | None:
     if group is None:
         return None
     return Ranks(group) if ranks > 1 else SERIAL
-
-
-def _opened(path: Path) -> Store:
-    from ensemble.store import Store
-
-    return Store.open(path)

@@ -33,7 +33,7 @@ def whole_store(store: StoreOnRank) -> Store:
 
 
 @contextmanager
-def store_on_ranks(communicator: Intracomm, path: Path) -> Iterator[StoreOnRank]:
+def store_on_ranks(communicator: Intracomm | None, path: Path) -> Iterator[StoreOnRank]:
     """Open a store to write to, on all ranks of a communicator.
 
     Only the first rank has a connection to the catalog: SQLite files on a network file system must be used
@@ -41,7 +41,8 @@ def store_on_ranks(communicator: Intracomm, path: Path) -> Iterator[StoreOnRank]
 
     Parameters
     ----------
-    communicator : Intracomm
+    communicator : Intracomm or None
+        All ranks; None if this process is alone.
     path : Path
         As the first rank understands it.
 

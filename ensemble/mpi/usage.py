@@ -10,9 +10,15 @@ from dataclasses import dataclass
 class RunUsage:
     """What it took to make the runs of a job.
 
-    `busy_fractions` holds one number a group: the share of the time that it spent in simulations, from the
-    start to the moment from which on some group found nothing useful left to run.  It is empty when
-    the store had every answer.
+    Attributes
+    ----------
+    runs : int
+        How many were made.
+    wall_seconds : float
+        From the first report to the last order.
+    busy_fractions : tuple of float
+        For each group of ranks the share of the time that it spent in simulations, from the start to the
+        moment from which on some group found nothing useful left to run.  Empty if the store had all answers.
     """
 
     runs: int
@@ -20,24 +26,25 @@ class RunUsage:
     busy_fractions: tuple[float, ...]
 
 
-class Usage:
-    """How much of its time each rank spends in simulations.
+class UsageMeter:
+    """Measures how much of its time each group spends in simulations.
 
-    Time counts until the moment from which on some rank has nothing useful left to run: what is left then
+    Time counts until the moment from which on some group has nothing useful left to run.  What is left then
     cannot be divided further, so it says nothing about the schedule.
 
     Parameters
     ----------
-    ranks : int
+    groups : int
+        How many there are.
     clock : callable
-        Seconds; the first reading is the start.
+        Returns seconds; the first reading is the start.
     """
 
-    def __init__(self, ranks: int, clock: Callable[[], float]) -> None:
+    def __init__(self, groups: int, clock: Callable[[], float]) -> None:
         self._clock = clock
         self._start = clock()
-        self._intervals: list[list[tuple[float, float]]] = [[] for _ in range(ranks)]
-        self._dry: float | None = None
+        self._intervals: list[list[tuple[float, float]]] = [[] for _ in range(groups)]
+        self._first_idle: float | None = None
 
     @property
     def elapsed(self) -> float:
@@ -50,23 +57,37 @@ class Usage:
         runs = [end - begin for intervals in self._intervals for begin, end in intervals]
         return sum(runs) / len(runs) if runs else None
 
-    def ran(self, rank: int, seconds: float) -> None:
-        """Record that a rank has just come back from `seconds` of simulation."""
-        now = self._clock()
-        self._intervals[rank].append((now - seconds, now))
+    def record_run(self, group: int, seconds: float) -> None:
+        """Record that a group has just finished a simulation.
 
-    def idle(self, ranks: int) -> None:
-        """Record how many ranks wait although every useful run is being made."""
-        if ranks == 0:
-            self._dry = None
-        elif self._dry is None:
-            self._dry = self._clock()
+        Parameters
+        ----------
+        group : int
+            Index of the group.
+        seconds : float
+            That the simulation took.
+        """
+        now = self._clock()
+        self._intervals[group].append((now - seconds, now))
+
+    def record_idle(self, groups: int) -> None:
+        """Record how many groups wait although every useful run is being made.
+
+        Parameters
+        ----------
+        groups : int
+            How many wait.
+        """
+        if groups == 0:
+            self._first_idle = None
+        elif self._first_idle is None:
+            self._first_idle = self._clock()
 
     def fractions(self) -> tuple[float, ...]:
-        """Busy share of the time of each rank; empty when nothing ran."""
+        """Return the busy share of the time of each group; empty if nothing ran."""
         if not any(self._intervals):
             return ()
-        end = self._clock() if self._dry is None else self._dry
+        end = self._clock() if self._first_idle is None else self._first_idle
         return tuple(
             sum(max(0.0, min(stop, end) - begin) for begin, stop in intervals) / (end - self._start)
             for intervals in self._intervals

@@ -1,7 +1,7 @@
-"""The edge to MPI: the world communicator, the launcher's view of it, and ending a job as a whole.
+"""Where MPI begins and ends: the communicator of all ranks, what the launcher says of it, and ending a job.
 
 Only the command line calls `world`; everything else takes its communicator as an argument.  mpi4py is
-imported when a communicator is asked for, so commands that need none run where no MPI is installed.
+imported when a communicator is requested, so commands that need none run where no MPI is installed.
 """
 
 from __future__ import annotations
@@ -42,12 +42,34 @@ def pin_threads() -> None:
 
 
 def launched_size(environment: Mapping[str, str] = os.environ) -> int:
-    """Number of processes the launcher says it started; 1 without a launcher."""
+    """Return the number of processes that the launcher says it has started.
+
+    Parameters
+    ----------
+    environment : mapping
+        Environment variables.
+
+    Returns
+    -------
+    int
+        1 without a launcher.
+    """
     return _first_integer(environment, _SIZE_VARIABLES, 1)
 
 
 def launched_rank(environment: Mapping[str, str] = os.environ) -> int:
-    """Rank the launcher gave this process; 0 without a launcher."""
+    """Return the rank that the launcher has given this process.
+
+    Parameters
+    ----------
+    environment : mapping
+        Environment variables.
+
+    Returns
+    -------
+    int
+        0 without a launcher.
+    """
     return _first_integer(environment, _RANK_VARIABLES, 0)
 
 
@@ -59,7 +81,12 @@ def _first_integer(environment: Mapping[str, str], variables: tuple[str, ...], d
 
 
 def world() -> Intracomm:
-    """The communicator of all launched processes, checked.
+    """Return the communicator of all launched processes, after checking it.
+
+    Returns
+    -------
+    Intracomm
+        All ranks.
 
     Raises
     ------
@@ -85,9 +112,26 @@ def world() -> Intracomm:
 
 
 def on_root(communicator: Intracomm | None, function: Callable[[], T]) -> T:
-    """Call ``function`` on rank 0 and return its result, or raise its `BadInput`, on every rank.
+    """Call a function on rank 0, and return its result or raise its `BadInput` on every rank.
 
-    Collective.  The result is pickled.  Without a communicator this process is the only rank.
+    Collective.
+
+    Parameters
+    ----------
+    communicator : Intracomm or None
+        All ranks; None if this process is alone.
+    function : callable
+        Its result is pickled.
+
+    Returns
+    -------
+    object
+        The result, on every rank.
+
+    Raises
+    ------
+    BadInput
+        On every rank, if the function raises it.
     """
     if communicator is None:
         return function()
@@ -105,7 +149,7 @@ def on_root(communicator: Intracomm | None, function: Callable[[], T]) -> T:
 
 @contextmanager
 def only_first_rank_speaks() -> Iterator[None]:
-    """Within the block, drop what this process prints if its launcher gave it another rank than 0."""
+    """Drop what this process prints within the block if its launcher has given it another rank than 0."""
     with ExitStack() as stack:
         if launched_rank() != 0:
             nowhere = stack.enter_context(open(os.devnull, "w"))
@@ -115,17 +159,24 @@ def only_first_rank_speaks() -> Iterator[None]:
 
 
 @contextmanager
-def abort_guard(communicator: Intracomm) -> Iterator[None]:
+def abort_guard(communicator: Intracomm | None) -> Iterator[None]:
     """End the whole job, with status 1, when an exception leaves the block on this rank.
 
-    Without it the other ranks would wait for this one for ever.  `BadInput` passes: it comes from
-    `on_root` and leaves the block on every rank.
+    Otherwise the other ranks would wait for this one for ever.  `BadInput` passes: it comes from `on_root`
+    and leaves the block on every rank.
+
+    Parameters
+    ----------
+    communicator : Intracomm or None
+        All ranks; None if this process is alone, which then ends as it would without the block.
     """
     try:
         yield
     except (BadInput, SystemExit):
         raise
     except BaseException:
+        if communicator is None:
+            raise
         # The stream of the process: the command line silences sys.stderr on every rank but the first.
         print(traceback.format_exc(), file=sys.__stderr__, flush=True)
         # The launcher stops forwarding output as soon as it hears of the end.

@@ -10,18 +10,19 @@ from solver.analysis.outcome import latest_time
 from solver.analysis.run import Outcome
 from solver.scene import Scene
 
-_AUTOMATIC_POINTS = 64  # that a scene usually comes to which leaves the number to the solver
+_AUTOMATIC_POINTS = 64  # what a scene that leaves the number to the solver usually comes to
 
 
 class Batch:
-    """The task queue of a batch: the longest run first, so that none is left alone at the end.
+    """The task queue of a batch: the longest run comes first, so that the last ones end at about one time.
 
     Parameters
     ----------
     scenes : iterable of Scene
         Equal ones are run once.
     known : callable
-        Outcome of the run with this key if it has been made before, else None.  Such a run is never a task.
+        Returns the outcome of the run with a key if it has been made before, else None.  A run that has been
+        made before is never a task.
     """
 
     def __init__(self, scenes: Iterable[Scene], known: Callable[[str], Outcome | None]) -> None:
@@ -42,16 +43,30 @@ class Batch:
         return task
 
     def answer(self, task: Task, outcome: Outcome) -> None:
-        """See `TaskQueue`.  Whatever the outcome is, a numerical failure too, the run has been made."""
+        """Take note that a run has been made, whatever its outcome is: a numerical failure counts too.
+
+        Parameters
+        ----------
+        task : Task
+            A task that is handed out.
+        outcome : Outcome
+            Of its run.
+        """
         self._running.remove(task.key)
 
     def cancelled(self, task: Task) -> None:
-        """See `TaskQueue`."""
+        """See `TaskQueue`.
+
+        Parameters
+        ----------
+        task : Task
+            A task that is handed out.
+        """
         self._running.remove(task.key)
         self._waiting.append(task)
 
-    def pointless_tasks(self) -> tuple[Task, ...]:
-        """See `TaskQueue`.  Every run of a batch is wanted."""
+    def unneeded_tasks(self) -> tuple[Task, ...]:
+        """Return nothing: every run of a batch is needed."""
         return ()
 
     @property
@@ -66,11 +81,20 @@ class Batch:
 
 
 def expected_work(scene: Scene) -> float:
-    """A number that grows with the time that a run will take; only comparisons mean anything.
+    """Return a number that grows with the time that a run is expected to take.
 
-    The time up to which it may go on, times the pairs of points.  Nothing says beforehand when a run will
-    be decided.
+    It is the time up to which the run may go on, times the pairs of points.  When a run will be decided
+    cannot be known beforehand, so only comparisons mean anything.
+
+    Parameters
+    ----------
+    scene : Scene
+        That is run.
+
+    Returns
+    -------
+    float
     """
     points = _AUTOMATIC_POINTS if scene.numerics.points == "auto" else scene.numerics.points
-    before = scene.start.horizon if scene.start.relaxed else 0.0
-    return (before + latest_time(scene)) * (len(scene.vesicles) * points) ** 2
+    relaxation = scene.start.horizon if scene.start.relaxed else 0.0
+    return (relaxation + latest_time(scene)) * (len(scene.vesicles) * points) ** 2

@@ -20,12 +20,26 @@ def _bracket_mean(fields: dict[str, Any]) -> float | None:
 
 
 class BoundaryPoint(BaseModel):
-    """The bracket of the critical value at one set of parameters.
+    """The bracket of the critical value at one value of the swept parameter.
 
-    `critical_value` is the geometric mean of the bracket's ends, and None while one of them is unknown.
-    `outcomes` are those at the two ends of the bracket, `runs` the keys of the runs behind it.
-    `certified` says that both ends were run again at finer numerics, `certified_by`, and are on their sides
-    there; `outcomes` are then those of the finer runs.
+    Attributes
+    ----------
+    parameters : dict
+        The swept parameter by its dotted path.
+    bracket : (float or None, float or None)
+        Between which values the critical value lies; None for an end that is unknown.
+    critical_value : float or None
+        Geometric mean of the bracket's ends; None while one of them is unknown.
+    outcomes : (str or None, str or None)
+        At the two ends of the bracket; if it is certified, those of the finer runs.
+    status : str
+        What the search, or the certification, has come to.
+    certified : bool
+        Whether both ends were run again at finer numerics and came out on the same sides.
+    certified_by : Numerics or None
+        The finer numerics.
+    runs : list of str
+        Keys of the runs behind the point.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -41,7 +55,21 @@ class BoundaryPoint(BaseModel):
 
 
 class Boundary(BaseModel):
-    """A study and the points of its boundary as far as they are known at `updated`."""
+    """The boundary of a study, as far as it is known.
+
+    Attributes
+    ----------
+    study_key : str
+        Key of the study.
+    study : dict
+        The study in full.
+    name : str
+        Of the study.
+    points : list of BoundaryPoint
+        One for each value of the sweep.
+    updated : datetime
+        When it was known so far.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 

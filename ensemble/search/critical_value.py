@@ -4,13 +4,13 @@ The search hands out values to try (`CriticalValueSearch.ask`) and takes answers
 (`CriticalValueSearch.tell`).  Its final bracket depends only on the side of every value, not on how, by how
 many workers or in which order the answers were found:
 
-- Values lie on a grid, and where all runs are decided the bracket ends as two neighbors on it.
-- Runs without an answer (undecided, failed) are worked around.  Their zone is closed in from both sides
-  until `ZONE_EDGE` values in a row next to the largest low and next to the smallest high are known to
-  give no answer, or all between the two are.  This assumes at most one row of such a length or longer;
-  shorter ones may lie anywhere.
+- Values lie on a grid.  Where all runs are decided the bracket ends as two neighbors on it.
+- Runs without an answer (undecided, failed) are worked around.  The search approaches the zone where they
+  lie from both sides.  It stops when `ZONE_EDGE` values in a row next to the largest low and next to the
+  smallest high are known to give no answer, or when all between these two are known.  This assumes that
+  there is at most one such row of that length or longer; shorter ones may lie anywhere.
 - A low above a high contradicts a single critical value.  The search stops, and the bracket spans the
-  contradiction: from the largest low with no high at or below it to the smallest high with no low above.
+  contradiction: from the largest low with no high at or below it to the smallest high with no low above it.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from typing import Protocol
 
 from ensemble.config.geometric_grid import GeometricGrid
 
-# Numerical failures may be isolated, so one of them is not yet the edge of a zone that has no answers.
+# Numerical failures may be isolated, so one of them is not yet the edge of a zone without answers.
 ZONE_EDGE = 3
 
 
 class Side(StrEnum):
-    """On which side of the critical value an outcome lies; the last two are no answer to that."""
+    """On which side of the critical value an outcome lies; `UNDECIDED` and `FAILED` tell nothing about it."""
 
     LOW = "low"
     HIGH = "high"
@@ -36,14 +36,21 @@ class Side(StrEnum):
     FAILED = "failed"
 
 
-class Status(StrEnum):
+class SearchStatus(StrEnum):
     """What a search has come to.
 
-    SEARCHING : there are values left whose answers matter.
-    CONVERGED : the bracket is two neighbors on the grid.
-    UNDECIDED, FAILED : it cannot be, as runs between its ends are undecided or (next to an end) failed.
-    NON_MONOTONE : a low was found above a high.
-    UNBRACKETED : all values within the limits lie on one side.
+    Attributes
+    ----------
+    SEARCHING
+        There are values left whose answers are needed.
+    CONVERGED
+        The bracket is two neighbors on the grid.
+    UNDECIDED, FAILED
+        The bracket cannot converge because runs between its ends are undecided or (next to an end) failed.
+    NON_MONOTONE
+        A low lies above a high.
+    UNBRACKETED
+        All values within the limits lie on one side.
     """
 
     SEARCHING = "searching"
@@ -54,34 +61,34 @@ class Status(StrEnum):
     UNBRACKETED = "unbracketed"
 
 
-class _Belief(Protocol):
-    """Where the critical value is thought to lie, as a distribution over grid indices."""
+class _Prior(Protocol):
+    """Where the critical value is expected, as a probability distribution over grid indices."""
 
     def weight(self, low: int, high: int) -> float:
         """Return the probability, up to a factor, of the interval between two indices."""
 
-    def middle(self, low: int, high: int) -> float:
+    def median(self, low: int, high: int) -> float:
         """Return the point that halves this probability."""
 
 
-class _Anywhere:
-    """All indices alike; halving it is bisection."""
+class _UniformPrior:
+    """All indices are equally likely.  Halving the probability is bisection."""
 
     def weight(self, low: int, high: int) -> float:
         return high - low
 
-    def middle(self, low: int, high: int) -> float:
+    def median(self, low: int, high: int) -> float:
         return (low + high) / 2
 
 
 @dataclass(frozen=True)
-class _Near:
+class _CauchyPrior:
     """A Cauchy distribution with its quartiles at the ends of a guess.
 
-    Halving it tries the middle of the guess, then the end on the side of the answer, then bisects within
-    the guess, or, when the guess was wrong, doubles the distance from it.  With offsets d from the center,
-    the distribution function is the angle of the vector (half_width, d); sums of unit vectors keep their
-    accuracy where differences of arctangents lose it.
+    Halving its probability tries the middle of the guess, then the end on the side of the answer.  If the
+    guess was right, it then bisects within the guess; if not, it doubles the distance from it.  With offsets
+    d from the center, the distribution function is the angle of the vector (half_width, d).  Sums of unit
+    vectors keep their accuracy where differences of arctangents lose it.
     """
 
     center: float
@@ -91,7 +98,7 @@ class _Near:
         below, above = low - self.center, high - self.center
         return math.atan2(self.half_width * (above - below), self.half_width**2 + below * above)
 
-    def middle(self, low: int, high: int) -> float:
+    def median(self, low: int, high: int) -> float:
         below, above = low - self.center, high - self.center
         norm_below, norm_above = math.hypot(self.half_width, below), math.hypot(self.half_width, above)
         tangent = (below / norm_below + above / norm_above) / (1 / norm_below + 1 / norm_above)
@@ -99,13 +106,14 @@ class _Near:
 
 
 class CriticalValueSearch:
-    """The critical value on a grid, within limits.
+    """The search for a critical value on a grid, within limits.
 
     Parameters
     ----------
     grid : GeometricGrid
+        The values that may be tried.
     limits : (float, float)
-        Values are tried from the first to the second, 0 < low < high.
+        Least and greatest value that may be tried, 0 < low < high.
     guess : (float, float), optional
         Where the critical value is expected.  It decides only what is tried first; it may be wrong.
 
@@ -127,39 +135,51 @@ class CriticalValueSearch:
             raise ValueError(f"limits: [{low}, {high}] — hold no two values {grid.tolerance} apart")
         self._sides: dict[int, Side] = {}
         self._pending: set[int] = set()
-        self._belief = self._believe(guess)
+        self._prior: _Prior = _UniformPrior() if guess is None else self._prior_of(guess)
 
     def ask(self) -> float | None:
         """Return the most useful value to try now and mark it as pending; None if there is none.
 
-        Of all values that may narrow the bracket it is the one that halves the likeliest interval left
-        by the values told and pending.  That is bisection for a single worker, and for several it keeps
-        the expected remainder after all pending answers smallest.
+        Of all values that may narrow the bracket it is the one that halves the most probable interval
+        between values that are known or pending.  For a single worker that is bisection.  For several it
+        minimizes the interval that is expected to remain after all pending answers.
         """
         gaps = [gap for region in self._regions() for gap in self._between_pending(*region)]
         if not gaps:
             return None
-        low, high = max(gaps, key=lambda gap: self._belief.weight(*gap))
-        index = min(max(round(self._belief.middle(low, high)), low + 1), high - 1)
+        low, high = max(gaps, key=lambda gap: self._prior.weight(*gap))
+        index = min(max(round(self._prior.median(low, high)), low + 1), high - 1)
         self._pending.add(index)
         return self._grid.value(index)
 
     def tell(self, value: float, side: Side) -> None:
-        """Take the answer for a value, asked for or not.
+        """Take the answer for a value, whether or not it was asked for.
+
+        Parameters
+        ----------
+        value : float
+            On the grid, within the limits.
+        side : Side
+            On which it lies.
 
         Raises
         ------
         ValueError
-            If the value is not on the grid or outside the limits, or was told to lie on another side.
+            If the value is not on the grid or outside the limits, or is known to lie on another side.
         """
         index = self._index(value)
         known = self._sides.setdefault(index, side)
         if known is not side:
-            raise ValueError(f"{value!r} cannot be {side}: it was told to be {known}")
+            raise ValueError(f"{value!r} cannot be {side}: it is known to be {known}")
         self._pending.discard(index)
 
     def withdraw(self, value: float) -> None:
-        """Give back a pending value whose run was cancelled or lost; it may be asked again.
+        """Give back a pending value whose run was cancelled or lost; it may be asked for again.
+
+        Parameters
+        ----------
+        value : float
+            A pending one.
 
         Raises
         ------
@@ -171,19 +191,24 @@ class CriticalValueSearch:
             raise ValueError(f"{value!r} is not pending")
         self._pending.remove(index)
 
-    def reseed(self, guess: tuple[float, float]) -> None:
-        """Replace the guess, as long as nothing has been told.
+    def replace_guess(self, guess: tuple[float, float]) -> None:
+        """Replace the guess, as long as there are no answers.
+
+        Parameters
+        ----------
+        guess : (float, float)
+            Where the critical value is expected.
 
         Raises
         ------
         ValueError
-            If an answer has been told, or the guess is not 0 < low <= high.
+            If there is an answer already, or the guess is not 0 < low <= high.
         """
         if self._sides:
             raise ValueError("a search that has answers takes no other guess")
-        self._belief = self._believe(guess)
+        self._prior = self._prior_of(guess)
 
-    def pointless(self) -> frozenset[float]:
+    def unneeded(self) -> frozenset[float]:
         """Return the pending values whose answers can no longer narrow the bracket."""
         low, high = self._ends()
         done = self.done
@@ -199,41 +224,40 @@ class CriticalValueSearch:
         )
 
     @property
-    def offending(self) -> tuple[float, ...]:
+    def contradictions(self) -> tuple[float, ...]:
         """The lows above a high and the highs below a low, ascending; empty unless non-monotone."""
         low, high = self._ends()
         return tuple(
             self._grid.value(index)
-            for index in self._told_between(low, high)
+            for index in self._known_between(low, high)
             if self._sides[index] in (Side.LOW, Side.HIGH)
         )
 
     @property
-    def status(self) -> Status:
+    def status(self) -> SearchStatus:
         """What the search has come to."""
-        if self.offending:
-            return Status.NON_MONOTONE
+        if self.contradictions:
+            return SearchStatus.NON_MONOTONE
         if self._regions():
-            return Status.SEARCHING
+            return SearchStatus.SEARCHING
         low, high = self._ends()
         if high - low > 1:
             failed = Side.FAILED in (self._sides[low + 1], self._sides[high - 1])
-            return Status.FAILED if failed else Status.UNDECIDED
-        return Status.CONVERGED if low in self._indices and high in self._indices else Status.UNBRACKETED
+            return SearchStatus.FAILED if failed else SearchStatus.UNDECIDED
+        bracketed = low in self._indices and high in self._indices
+        return SearchStatus.CONVERGED if bracketed else SearchStatus.UNBRACKETED
 
     @property
     def done(self) -> bool:
         """Whether no further answer is needed."""
-        return self.status is not Status.SEARCHING
+        return self.status is not SearchStatus.SEARCHING
 
-    def _believe(self, guess: tuple[float, float] | None) -> _Belief:
-        if guess is None:
-            return _Anywhere()
+    def _prior_of(self, guess: tuple[float, float]) -> _Prior:
         low, high = guess
         if not 0 < low <= high < math.inf:
             raise ValueError(f"guess: [{low}, {high}] — must be 0 < low <= high")
         first, last = self._grid.nearest(low), self._grid.nearest(high)
-        return _Near(center=(first + last) / 2, half_width=max((last - first) / 2, 1))
+        return _CauchyPrior(center=(first + last) / 2, half_width=max((last - first) / 2, 1))
 
     def _index(self, value: float) -> int:
         index = self._grid.index(value)
@@ -253,32 +277,32 @@ class CriticalValueSearch:
             min((index for index in highs if index > largest_low), default=above),
         )
 
-    def _told_between(self, low: int, high: int) -> list[int]:
+    def _known_between(self, low: int, high: int) -> list[int]:
         return sorted(index for index in self._sides if low < index < high)
 
     def _regions(self) -> list[tuple[int, int]]:
-        """Return the open intervals of values that matter: not told, and no longer implied by those told.
+        """Return the open intervals of values that are needed: neither known nor implied by what is known.
 
         At most two, one at each end of the bracket; the same one twice if there is nothing between.
         """
-        if self.offending:
+        if self.contradictions:
             return []
         low, high = self._ends()
-        silent = self._told_between(low, high)
-        gaps = [gap for gap in pairwise([low, *silent, high]) if gap[1] - gap[0] > 1]
+        unanswered = self._known_between(low, high)
+        gaps = [gap for gap in pairwise([low, *unanswered, high]) if gap[1] - gap[0] > 1]
         if not gaps:
             return []
         regions = []
-        first, next_silent = gaps[0]
+        first, next_unanswered = gaps[0]
         if first == low:
-            regions.append((low, next_silent))
+            regions.append((low, next_unanswered))
         elif first - low < ZONE_EDGE:
-            regions.append((first, min(next_silent, low + ZONE_EDGE + 1)))
-        previous_silent, last = gaps[-1]
+            regions.append((first, min(next_unanswered, low + ZONE_EDGE + 1)))
+        previous_unanswered, last = gaps[-1]
         if last == high:
-            regions.append((previous_silent, high))
+            regions.append((previous_unanswered, high))
         elif high - last < ZONE_EDGE:
-            regions.append((max(previous_silent, high - ZONE_EDGE - 1), last))
+            regions.append((max(previous_unanswered, high - ZONE_EDGE - 1), last))
         return regions
 
     def _between_pending(self, low: int, high: int) -> list[tuple[int, int]]:

@@ -7,25 +7,44 @@ from numpy.polynomial import Polynomial
 from pydantic import BaseModel
 
 from ensemble.search.boundary import Boundary
-from ensemble.search.critical_value import Status
+from ensemble.search.critical_value import SearchStatus
 
 FEWEST_POINTS = 3  # two points lie on a line whatever the physics
 
 
 class Line(BaseModel):
-    """The straight line through the converged points: critical value = intercept + slope × parameter."""
+    """The straight line through the converged points: critical value = intercept + slope × parameter.
+
+    Attributes
+    ----------
+    intercept : float
+        Critical value where the parameter is 0.
+    slope : float
+        Of the critical value against the parameter.
+    """
 
     intercept: float
     slope: float
 
 
 def line_through(boundary: Boundary) -> Line | None:
-    """Fit a line to the converged points by least squares; None if there are fewer than three."""
+    """Fit a line to the converged points of a boundary by least squares.
+
+    Parameters
+    ----------
+    boundary : Boundary
+        The boundary.
+
+    Returns
+    -------
+    Line or None
+        None if fewer than three points have converged.
+    """
     swept = boundary.study["sweep"]["parameter"]
     points = [
         (point.parameters[swept], point.critical_value)
         for point in boundary.points
-        if point.status == Status.CONVERGED and point.critical_value is not None
+        if point.status == SearchStatus.CONVERGED and point.critical_value is not None
     ]
     if len(points) < FEWEST_POINTS:
         return None

@@ -1,4 +1,4 @@
-"""What is asked at one value of a sweep: a search or a certification, with its answers and its tasks."""
+"""The search, or the certification, at one value of a sweep, with its answers and its tasks."""
 
 from __future__ import annotations
 
@@ -15,32 +15,54 @@ from solver.scene import Scene
 
 @dataclass(frozen=True, kw_only=True)
 class SearchRun(Task):
-    """A run to make, and the place in the study whose question it answers."""
+    """A run to make for a search, and its place in the study.
+
+    Attributes
+    ----------
+    sweep_value : float
+        Of the swept parameter.
+    value : float
+        Of the searched parameter.
+    """
 
     sweep_value: float
     value: float
 
 
 @dataclass(frozen=True)
-class _Answer:
+class _KnownRun:
     outcome: Outcome
     key: str
 
 
 class ValueSearch(Protocol):
-    """Hands out values to try and takes the sides on which they lie, in any order."""
+    """Asks for values to try and takes the sides on which they lie, in any order."""
 
     def ask(self) -> float | None:
         """Return a value to try and mark it as pending; None if there is none."""
 
     def tell(self, value: float, side: Side) -> None:
-        """Take the answer for a value."""
+        """Take the answer for a value.
+
+        Parameters
+        ----------
+        value : float
+            That was tried.
+        side : Side
+            On which it lies.
+        """
 
     def withdraw(self, value: float) -> None:
-        """Give back a pending value."""
+        """Give back a pending value.
 
-    def pointless(self) -> frozenset[float]:
-        """Return the pending values whose answers no longer matter."""
+        Parameters
+        ----------
+        value : float
+            A pending one.
+        """
+
+    def unneeded(self) -> frozenset[float]:
+        """Return the pending values whose answers are no longer needed."""
 
     @property
     def done(self) -> bool:
@@ -51,18 +73,21 @@ SomeValueSearch = TypeVar("SomeValueSearch", bound=ValueSearch)
 
 
 class PointSearch(Generic[SomeValueSearch]):
-    """Turns the values that are asked into tasks, and outcomes of runs into answers.
+    """Turns the values that a search asks for into tasks, and outcomes of runs into answers.
 
     Parameters
     ----------
-    asking : Asking
+    search : ValueSearch
+        What asks for values.
     sweep_value : float
+        Where it searches.
     scene_at : callable
-        Scene of a value.
+        Returns the scene of a value.
     side : callable
-        Side of an outcome.
+        Returns the side of an outcome.
     known : callable
-        Outcome of the run with this key if it has been made before, else None.  Such a run is never a task.
+        Returns the outcome of the run with a key if it has been made before, else None.  A run that has been
+        made before is never a task.
     """
 
     def __init__(
@@ -78,18 +103,18 @@ class PointSearch(Generic[SomeValueSearch]):
         self._scene_at = scene_at
         self._side = side
         self._known = known
-        self._answers: dict[float, _Answer] = {}
+        self._answers: dict[float, _KnownRun] = {}
         self._pending: dict[float, SearchRun] = {}
         self.known_answers = 0
 
     @property
     def pending(self) -> Mapping[float, SearchRun]:
-        """Trials that are out, by value."""
+        """The tasks that are handed out, by value."""
         return self._pending
 
     @property
-    def untouched(self) -> bool:
-        """Whether nothing is known and nothing is out."""
+    def is_new(self) -> bool:
+        """Whether no answer is known and no task is handed out."""
         return not self._answers and not self._pending
 
     @property
@@ -98,13 +123,24 @@ class PointSearch(Generic[SomeValueSearch]):
         return [self._answers[value].key for value in sorted(self._answers)]
 
     def outcomes(self, bracket: tuple[float | None, float | None]) -> tuple[str | None, str | None]:
-        """Outcomes at the ends of a bracket; None where an end is unknown."""
+        """Return the outcomes at the ends of a bracket.
+
+        Parameters
+        ----------
+        bracket : (float or None, float or None)
+            Two values whose answers are known; None for an end that is unknown.
+
+        Returns
+        -------
+        (str or None, str or None)
+            None for an end that is unknown.
+        """
         low, high = (None if end is None else self._answers[end].outcome for end in bracket)
         return low, high
 
-    def pointless_tasks(self) -> tuple[SearchRun, ...]:
-        """Return the tasks that are out and whose outcome no longer matters."""
-        return tuple(self._pending[value] for value in sorted(self.search.pointless()))
+    def unneeded_tasks(self) -> tuple[SearchRun, ...]:
+        """Return the tasks that are handed out and whose outcome is no longer needed."""
+        return tuple(self._pending[value] for value in sorted(self.search.unneeded()))
 
     def next_task(self) -> SearchRun | None:
         """Return the task of the most useful value to try; None if there is none."""
@@ -116,7 +152,18 @@ class PointSearch(Generic[SomeValueSearch]):
         return None
 
     def take_known(self, value: float) -> bool:
-        """Take the answer for a value if its run has been made before, and say whether it was."""
+        """Take the answer for a value if its run has been made before.
+
+        Parameters
+        ----------
+        value : float
+            That the search may try.
+
+        Returns
+        -------
+        bool
+            Whether it has been made before.
+        """
         task = self._task(value)
         outcome = self._known(task.key)
         if outcome is None:
@@ -126,19 +173,33 @@ class PointSearch(Generic[SomeValueSearch]):
         return True
 
     def take_all_known(self) -> None:
-        """Take the answers for all values that would be asked, as far as their runs have been made before."""
+        """Take the answers for all values that the search asks for, as far as their runs exist already."""
         while self.next_task() is not None:
             pass
         for task in tuple(self._pending.values()):
             self.cancelled(task)
 
     def answer(self, task: SearchRun, outcome: Outcome) -> None:
-        """Take the outcome of a task's run."""
+        """Take the outcome of a task's run.
+
+        Parameters
+        ----------
+        task : SearchRun
+            A task that is handed out.
+        outcome : Outcome
+            Of its run.
+        """
         del self._pending[task.value]
         self._take(task, outcome)
 
     def cancelled(self, task: SearchRun) -> None:
-        """Take back a task whose run was given up."""
+        """Take back a task whose run was cancelled.
+
+        Parameters
+        ----------
+        task : SearchRun
+            A task that is handed out.
+        """
         del self._pending[task.value]
         self.search.withdraw(task.value)
 
@@ -148,4 +209,4 @@ class PointSearch(Generic[SomeValueSearch]):
 
     def _take(self, task: SearchRun, outcome: Outcome) -> None:
         self.search.tell(task.value, self._side(outcome))
-        self._answers[task.value] = _Answer(outcome, task.key)
+        self._answers[task.value] = _KnownRun(outcome, task.key)

@@ -11,7 +11,7 @@ from ensemble.config.dotted_paths import parameter_value
 from ensemble.config.study import Study
 from ensemble.search.boundary import Boundary, BoundaryPoint
 from ensemble.search.certification import Certification, CertificationResult
-from ensemble.search.critical_value import CriticalValueSearch, Status
+from ensemble.search.critical_value import CriticalValueSearch, SearchStatus
 from ensemble.search.point_search import PointSearch, SearchRun
 from ensemble.search.study_search import (
     certification_of,
@@ -29,20 +29,22 @@ ENDS = 2  # of a bracket, hence runs of a certification that finds both where th
 
 
 class StudyPlanner:
-    """All searches of a study, the certifications of their brackets, and the tasks that are out.
+    """The task queue of a study: all of its searches and the certifications of their brackets.
 
     Searches are worked on in the order of the sweep, one task each before any gets a second one: two workers
-    get further on two searches than on one, and finished searches tell the later ones where to begin.
-    When there are more workers than searches left, the searches are cut into more than two parts at once.
-    Certifications come before that, as their runs are needed whatever the others say.
+    get further on two searches than on one, and finished searches show the later ones where to begin.  When
+    there are more workers than searches left, several values of one search are tried at once.  Certifications
+    come before that, because their runs are needed whatever the others come to.
 
     Parameters
     ----------
     study : Study
+        What is to be traced.
     known : callable
-        Outcome of the run with this key if it has been made before, else None.  Such a run is never a task.
+        Returns the outcome of the run with a key if it has been made before, else None.  A run that has been
+        made before is never a task.
     made : iterable of Scene
-        Scenes of runs made before.  Those of this study that are known are answers from the start.
+        Scenes of runs made before.  Those that belong to this study are answers from the start.
     """
 
     def __init__(
@@ -63,37 +65,51 @@ class StudyPlanner:
             self._searches[at].take_known(value)
 
     def next_task(self) -> SearchRun | None:
-        """Return the most useful task for an idle worker; None if every useful run is out already."""
-        return next((task for task in map(self._next_of, self._by_use()) if task is not None), None)
+        """See `TaskQueue`."""
+        return next((task for task in map(self._next_of, self._by_usefulness()) if task is not None), None)
 
     def answer(self, task: SearchRun, outcome: Outcome) -> None:
-        """Take the outcome of a task's run."""
+        """See `TaskQueue`.
+
+        Parameters
+        ----------
+        task : SearchRun
+            A task that is handed out.
+        outcome : Outcome
+            Of its run.
+        """
         self._point_search_of(task).answer(task, outcome)
 
     def cancelled(self, task: SearchRun) -> None:
-        """Take back a task whose run was given up."""
+        """See `TaskQueue`.
+
+        Parameters
+        ----------
+        task : SearchRun
+            A task that is handed out.
+        """
         self._point_search_of(task).cancelled(task)
 
-    def pointless_tasks(self) -> tuple[SearchRun, ...]:
-        """Return the tasks that are out and whose outcome no longer matters."""
+    def unneeded_tasks(self) -> tuple[SearchRun, ...]:
+        """See `TaskQueue`."""
         needed = list(self._point_searches())
         # A late answer may have shown that there is no single critical value, hence nothing to certify.
-        overtaken = [
+        abandoned = [
             point_search for point_search in self._certifications.values() if point_search not in needed
         ]
         return (
-            *(task for point_search in needed for task in point_search.pointless_tasks()),
-            *(task for point_search in overtaken for task in point_search.pending.values()),
+            *(task for point_search in needed for task in point_search.unneeded_tasks()),
+            *(task for point_search in abandoned for task in point_search.pending.values()),
         )
 
     @property
     def done(self) -> bool:
-        """Whether no search and no certification needs any further answer."""
+        """Whether no search and no certification needs a further answer."""
         return all(point_search.search.done for point_search in self._point_searches())
 
     @property
     def known_answers(self) -> int:
-        """How many answers are from runs made before."""
+        """See `TaskQueue`."""
         return sum(point_search.known_answers for point_search in self._point_searches())
 
     @property
@@ -116,7 +132,7 @@ class StudyPlanner:
         )
 
     def _place(self, scene: Scene) -> tuple[float, float] | None:
-        """Where in the study a run of this scene would be, if everything else in it is the study's."""
+        """The place in the study that a run of this scene would have if it is one of the study's."""
         try:
             at = parameter_value(scene, self._study.sweep.parameter)
             value = parameter_value(scene, self._study.search.parameter)
@@ -124,8 +140,8 @@ class StudyPlanner:
             return None
         return (at, value) if at in self._searches and value in self._values else None
 
-    def _by_use(self) -> Iterator[_AnyPointSearch]:
-        """Give all inquiries, the one whose next task is the most useful first."""
+    def _by_usefulness(self) -> Iterator[_AnyPointSearch]:
+        """Give all searches and certifications, the one whose next task is the most useful first."""
         # Sorting is stable: among equally busy searches the order of the sweep holds.
         searches = sorted(self._searches.values(), key=lambda search: len(search.pending))
         yield from (search for search in searches if not search.pending)
@@ -135,10 +151,10 @@ class StudyPlanner:
         yield from self._certifying()
 
     def _next_of(self, point_search: _AnyPointSearch) -> SearchRun | None:
-        if isinstance(point_search.search, CriticalValueSearch) and point_search.untouched:
+        if isinstance(point_search.search, CriticalValueSearch) and point_search.is_new:
             guess = expected_bracket(self._study, point_search.sweep_value, self._converged())
             if guess is not None:
-                point_search.search.reseed(guess)
+                point_search.search.replace_guess(guess)
         return point_search.next_task()
 
     def _point_searches(self) -> Iterator[_AnyPointSearch]:
@@ -177,7 +193,7 @@ class StudyPlanner:
 
     def _converged_bracket(self, at: float) -> tuple[float, float] | None:
         search = self._searches[at].search
-        low, high = search.bracket if search.status is Status.CONVERGED else (None, None)
+        low, high = search.bracket if search.status is SearchStatus.CONVERGED else (None, None)
         return None if low is None or high is None else (low, high)
 
     def _halvings(self, at: float) -> float:
@@ -191,11 +207,11 @@ class StudyPlanner:
         bracket, status, runs = search.search.bracket, str(search.search.status), search.runs
         outcomes, certified_by = search.outcomes(bracket), None
         if certification is not None:
-            verdict, ends = certification.search.verdict, certification.search.bracket
-            status, runs = str(verdict), runs + certification.runs
+            result, ends = certification.search.result, certification.search.bracket
+            status, runs = str(result), runs + certification.runs
             if ends is not None:
                 bracket, outcomes = ends, certification.outcomes(ends)
-                if verdict is CertificationResult.CONVERGED:
+                if result is CertificationResult.CONVERGED:
                     certified_by = certifying_scene(self._study.scene_at(at, ends[0])).numerics
         return BoundaryPoint(
             parameters={self._study.sweep.parameter: at},

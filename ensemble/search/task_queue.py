@@ -12,7 +12,14 @@ from solver.scene import Scene
 
 @dataclass(frozen=True, kw_only=True)
 class Task:
-    """A run to make: the scene and its key."""
+    """A run to make.
+
+    Attributes
+    ----------
+    scene : Scene
+    key : str
+        Of the run.
+    """
 
     scene: Scene
     key: str
@@ -25,16 +32,30 @@ class TaskQueue(Protocol[SomeTask]):
     """Hands out tasks to idle workers and takes the outcomes of their runs, in any order."""
 
     def next_task(self) -> SomeTask | None:
-        """Return the most useful task for an idle worker; None if every useful run is out already."""
+        """Return the most useful task for an idle worker; None if every useful one is handed out already."""
 
     def answer(self, task: SomeTask, outcome: Outcome) -> None:
-        """Take the outcome of a task's run."""
+        """Take the outcome of a task's run.
+
+        Parameters
+        ----------
+        task : Task
+            A task that is handed out.
+        outcome : Outcome
+            Of its run.
+        """
 
     def cancelled(self, task: SomeTask) -> None:
-        """Take back a task whose run was given up."""
+        """Take back a task whose run was cancelled.
 
-    def pointless_tasks(self) -> Sequence[SomeTask]:
-        """Return the tasks that are out and whose outcome no longer matters."""
+        Parameters
+        ----------
+        task : Task
+            A task that is handed out.
+        """
+
+    def unneeded_tasks(self) -> Sequence[SomeTask]:
+        """Return the tasks that are handed out and whose outcome is no longer needed."""
 
     @property
     def done(self) -> bool:
@@ -42,7 +63,7 @@ class TaskQueue(Protocol[SomeTask]):
 
     @property
     def known_answers(self) -> int:
-        """How many outcomes are from runs made before."""
+        """How many outcomes come from runs made before."""
 
     @property
     def runs_left(self) -> float:

@@ -1,12 +1,12 @@
-"""Jobs that are accepted at once, as most tests want them."""
+"""Submits jobs and waits until they are accepted, as most tests do."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from api.jobs.job_queue import Jobs, Submitted
+from api.jobs.job_queue import Jobs, SubmissionResult
 
 
-def accepted(jobs: Jobs, *offer: Any, **fields: Any) -> Submitted:
-    """What became of an offer, whose parameters these are."""
-    return jobs.settled(jobs.offer(*offer, **fields))
+def accepted(jobs: Jobs, *submission: Any, **options: Any) -> SubmissionResult:
+    """The result of a submission, with arguments as `Jobs.submit` takes them."""
+    return jobs.result(jobs.submit(*submission, **options))

@@ -30,9 +30,10 @@ from sqlalchemy import insert
 
 from api.database.database_tables import JobRow
 from api.database.service_database import Database
-from api.jobs.job import JobStatus, preset_work
+from api.jobs.job import JobStatus
 from api.jobs.job_queue import Jobs
 from api.settings import Settings
+from ensemble.questions import preset_question
 from ensemble.store import Store
 from tests.api.stores import fill
 
@@ -60,7 +61,8 @@ TO_MILLISECONDS = {"us": 1e-3, "ms": 1.0, "s": 1e3}
 def fill_queue(store: Path, count: int) -> list[str]:
     """Put finished jobs into the database; gives some of their identifiers."""
     with Database.open(Settings(store=store).database_url, store) as database:
-        job = Jobs(database, store).submit(preset_work("doublet-shear", {}), "ada", 1, 60.0).job
+        jobs = Jobs(database, store)
+        job = jobs.result(jobs.submit(preset_question("doublet-shear", {}), "ada", 1, 60.0)).job
         row = job.model_dump() | {
             "document": {},
             "fingerprint": "",

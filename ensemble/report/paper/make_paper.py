@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from matplotlib.figure import Figure
 
-from ensemble.cli.progress import progress_text
+from ensemble.display.progress import progress_text
 from ensemble.mpi.run_study import Snapshot, run_batch, run_study
 from ensemble.mpi.store_on_ranks import whole_store
 from ensemble.report import ReportName
@@ -128,17 +128,17 @@ def _make_runs(
     communicator: Intracomm, plan: SectionPlan, store: StoreOnRank, log: Tell, ranks_per_run: int
 ) -> int:
     """Make the runs of a plan on all ranks, and return how many they are."""
-    cost = run_batch(
+    usage = run_batch(
         communicator,
         [case.scene for case in plan.cases],
         store,
         lambda progress: log(f"runs: {progress_text(progress)}"),
         ranks_per_run,
     )
-    runs = cost.runs
+    runs = usage.runs
     for case in plan.studies:
         show = _progress_logger(case.study.name, log)
-        runs += run_study(communicator, case.study, store, show, ranks_per_run).cost.runs
+        runs += run_study(communicator, case.study, store, show, ranks_per_run).usage.runs
     return runs
 
 

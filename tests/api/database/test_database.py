@@ -15,9 +15,9 @@ from sqlalchemy import delete, inspect, text
 
 from api.database.database_tables import JobRow, ServiceTable
 from api.database.service_database import MIGRATIONS, Database
-from api.jobs.job import preset_work
 from api.jobs.job_queue import Jobs
 from ensemble.errors import BadInput
+from ensemble.questions import preset_question
 from tests.api.accepting import accepted
 from tests.api.processes import run_python
 
@@ -32,13 +32,13 @@ SUBMITTING = """
 import os, sys
 from pathlib import Path
 from api.database.service_database import Database
-from api.jobs.job import preset_work
+from ensemble.questions import preset_question
 from api.jobs.job_queue import Jobs
 jobs = Jobs(Database.open(sys.argv[1], Path(sys.argv[2])), Path(sys.argv[2]))
-work = preset_work("doublet-shear", {})
+question = preset_question("doublet-shear", {})
 while True:
     # One write, which arrives as a whole or not at all, like an answer over a socket.
-    os.write(1, (jobs.settled(jobs.offer(work, "ada", 1, 60.0)).job.id + "\\n").encode())
+    os.write(1, (jobs.result(jobs.submit(question, "ada", 1, 60.0)).job.id + "\\n").encode())
 """
 
 
@@ -104,7 +104,7 @@ def test_a_database_that_cannot_be_used_is_refused_on_one_line(url, store):
 
 
 def test_a_failing_transaction_is_rolled_back(database, jobs):
-    kept = accepted(jobs, preset_work("doublet-shear", {}), "ada", 1, 60.0).job
+    kept = accepted(jobs, preset_question("doublet-shear", {}), "ada", 1, 60.0).job
 
     def change_and_fail() -> None:
         with database.begin() as connection:

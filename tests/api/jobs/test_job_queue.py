@@ -20,23 +20,19 @@ from api.jobs.job import (
     IdempotencyConflict,
     Job,
     JobStatus,
-    Kind,
     Lease,
     NoSuchJob,
     TooManyJobs,
-    Work,
-    preset_work,
-    scene_work,
-    study_work,
 )
 from api.jobs.job_queue import LEASE_SECONDS, Jobs
-from api.jobs.worker_name import own_name
+from api.jobs.worker_identity import own_identity
 from ensemble.config.documents import load_scene, load_study
 from ensemble.config.run_key import run_key
+from ensemble.questions import Question, kind_of_model, preset_question
 from tests.api.accepting import accepted
 
-SCENE = preset_work("doublet-shear", {})
-OTHER_SCENE = preset_work("doublet-shear", {"flow.rate": 0.7})
+SCENE = preset_question("doublet-shear", {})
+OTHER_SCENE = preset_question("doublet-shear", {"flow.rate": 0.7})
 SECONDS = 60.0
 RACERS = 8
 
@@ -65,8 +61,8 @@ def jobs(database: Database, store: Path, clock: Clock) -> Jobs:
     return Jobs(database, store, clock)
 
 
-def submit(jobs: Jobs, owner: str = "ada", work: Work = SCENE) -> Job:
-    return accepted(jobs, work, owner, 1, SECONDS).job
+def submit(jobs: Jobs, owner: str = "ada", question: Question = SCENE) -> Job:
+    return accepted(jobs, question, owner, 1, SECONDS).job
 
 
 def leased(jobs: Jobs, worker: str = "worker") -> Lease:
@@ -79,24 +75,34 @@ def leased(jobs: Jobs, worker: str = "worker") -> Lease:
 
 
 def test_a_preset_becomes_the_study_or_the_scene_of_the_command_line():
-    study = preset_work("critical-hamaker", {"search.tolerance": 0.1})
-    assert (study.kind, study.name) == (Kind.STUDY, "critical-hamaker")
-    assert study.model == load_study("critical-hamaker", ["search.tolerance=0.1"])
+    study = preset_question("critical-hamaker", {"search.tolerance": 0.1})
+    assert (study.kind, study.name) == ("study", "critical-hamaker")
+    assert study.document == load_study("critical-hamaker", ["search.tolerance=0.1"])
     assert study.key == load_study("critical-hamaker", ["search.tolerance=0.1"]).key
-    scene = preset_work("doublet-shear", {"flow.rate": 0.7})
-    assert (scene.kind, scene.name) == (Kind.SCENE, "doublet-shear")
+    scene = preset_question("doublet-shear", {"flow.rate": 0.7})
+    assert (scene.kind, scene.name) == ("scene", "doublet-shear")
     assert scene.key == run_key(load_scene("doublet-shear", ["flow.rate=0.7"]))
 
 
-def test_documents_take_changes_too():
-    scene = load_scene("doublet-shear")
-    assert scene_work(scene, {}).model is scene
-    assert scene_work(scene, {"flow.rate": 0.7}).model == load_scene("doublet-shear", ["flow.rate=0.7"])
-    study = load_study("critical-hamaker")
-    assert study_work(study, {}).model is study
-    assert study_work(study, {"search.certify": True}).model == load_study(
-        "critical-hamaker", ["search.certify=true"]
-    )
+@pytest.mark.parametrize(
+    ("model", "changes", "changed"),
+    [
+        (
+            load_scene("doublet-shear"),
+            {"flow.rate": 0.7},
+            load_scene("doublet-shear", ["flow.rate=0.7"]),
+        ),
+        (
+            load_study("critical-hamaker"),
+            {"search.certify": True},
+            load_study("critical-hamaker", ["search.certify=true"]),
+        ),
+    ],
+)
+def test_documents_take_changes_too(model, changes, changed):
+    question = kind_of_model(model)(model)
+    assert question.changed({}) is question
+    assert question.changed(changes).document == changed
 
 
 @pytest.mark.parametrize(
@@ -110,9 +116,9 @@ def test_documents_take_changes_too():
         ("critical-hamaker", {"scene.vesicles.reduced_area": 1.2}, "scene.vesicles.0.reduced_area"),
     ],
 )
-def test_bad_work_is_refused_with_the_field(name, changes, field):
+def test_bad_presets_and_changes_are_refused_with_the_field(name, changes, field):
     with pytest.raises(ValueError, match=field):
-        preset_work(name, changes)
+        preset_question(name, changes)
 
 
 # Acceptance.
@@ -123,8 +129,8 @@ def test_an_accepted_job_is_what_was_asked_for(jobs, clock):
     assert submitted.new
     job = submitted.job
     assert jobs.get(job.id) == job
-    assert jobs.document(job) == SCENE.document
-    assert (job.owner, job.kind, job.name, job.key) == ("ada", Kind.SCENE, "doublet-shear", SCENE.key)
+    assert jobs.document(job) == SCENE.fields
+    assert (job.owner, job.kind, job.name, job.key) == ("ada", "scene", "doublet-shear", SCENE.key)
     assert (job.ranks, job.seconds, job.attempts, job.progress) == (2, SECONDS, 0, 0)
     assert job.status is JobStatus.ACCEPTED
     assert job.created == job.updated == clock.present
@@ -143,9 +149,9 @@ def test_one_key_makes_one_job_however_many_ask_at_once(jobs):
 
 def test_a_key_belongs_to_one_request_of_one_owner(jobs):
     first = accepted(jobs, SCENE, "ada", 1, SECONDS, "key")
-    for work, ranks, seconds in [(OTHER_SCENE, 1, SECONDS), (SCENE, 2, SECONDS), (SCENE, 1, 2 * SECONDS)]:
+    for question, ranks, seconds in [(OTHER_SCENE, 1, SECONDS), (SCENE, 2, SECONDS), (SCENE, 1, 2 * SECONDS)]:
         with pytest.raises(IdempotencyConflict, match="key"):
-            accepted(jobs, work, "ada", ranks, seconds, "key")
+            accepted(jobs, question, "ada", ranks, seconds, "key")
     assert accepted(jobs, OTHER_SCENE, "bob", 1, SECONDS, "key").new
     jobs.dismiss(first.job.id)
     again = accepted(jobs, SCENE, "ada", 1, SECONDS, "key")
@@ -227,13 +233,13 @@ def test_the_oldest_job_of_an_owner_comes_first(jobs):
 
 
 def test_the_job_of_a_worker_that_is_seen_to_have_died_is_taken_at_once(jobs):
-    place, number, started = own_name().split(" ")
+    place, number, started = own_identity().split(" ")
     dead = f"{place} {number} {int(started) - 1}"
     job, other = submit(jobs), submit(jobs)
     assert leased(jobs, dead).job.id == job.id
-    assert leased(jobs, own_name()).job.id == job.id, "without waiting for the lease to run out"
+    assert leased(jobs, own_identity()).job.id == job.id, "without waiting for the lease to run out"
     assert jobs.get(job.id).attempts == 2
-    assert leased(jobs, own_name()).job.id == other.id, "the living keep theirs"
+    assert leased(jobs, own_identity()).job.id == other.id, "the living keep theirs"
 
 
 def test_workers_that_ask_at_once_get_different_jobs(jobs):
@@ -254,7 +260,7 @@ def test_workers_that_ask_at_once_get_different_jobs(jobs):
 def test_a_leased_job_runs(jobs, clock):
     submit(jobs)
     lease = leased(jobs)
-    assert lease.document == SCENE.document
+    assert lease.document == SCENE.fields
     job = jobs.get(lease.job.id)
     assert job == lease.job
     assert (job.status, job.attempts, job.started) == (JobStatus.RUNNING, 1, job.updated)

@@ -13,11 +13,12 @@ import psutil
 import pytest
 
 from api.database.service_database import Database
-from api.jobs.job import Job, JobStatus, Kind, Work, preset_work
+from api.jobs.job import Job, JobStatus
 from api.jobs.job_queue import Jobs
 from api.settings import Settings
 from api.worker.background import NICENESS
 from api.worker.worker import MAXIMUM_ATTEMPTS, JobResult, job_result
+from ensemble.questions import Question, preset_question
 from ensemble.store import Store
 from tests.api.accepting import accepted
 from tests.api.processes import Family, alive, wait_until, working
@@ -27,12 +28,14 @@ SECONDS_TO_DISMISS = 3
 SECONDS_TO_DIE = 5
 
 COARSE = {"numerics.points": 32, "numerics.tolerance": 1e-3}
-QUICK_SCENE = preset_work("doublet-shear", COARSE | {"criteria.revolutions": 1})
-LONG_SCENE = preset_work("doublet-shear", {"numerics.points": 256, "numerics.tolerance": 1e-9})
-FAILING_SCENE = preset_work("doublet-shear", COARSE | {"numerics.work_limit": 20})
+QUICK_SCENE = preset_question("doublet-shear", COARSE | {"criteria.revolutions": 1})
+LONG_SCENE = preset_question("doublet-shear", {"numerics.points": 256, "numerics.tolerance": 1e-9})
+FAILING_SCENE = preset_question("doublet-shear", COARSE | {"numerics.work_limit": 20})
 COARSE_STUDY = {f"scene.{path}": value for path, value in COARSE.items()}
-STUDY = preset_work("critical-hamaker", COARSE_STUDY | {"search.tolerance": 0.2, "sweep.values": [0.5, 1.0]})
-UNBRACKETED_STUDY = preset_work(
+STUDY = preset_question(
+    "critical-hamaker", COARSE_STUDY | {"search.tolerance": 0.2, "sweep.values": [0.5, 1.0]}
+)
+UNBRACKETED_STUDY = preset_question(
     "critical-hamaker",
     COARSE_STUDY
     | {
@@ -51,8 +54,8 @@ def jobs(store: Path) -> Iterator[Jobs]:
         yield Jobs(database, store)
 
 
-def submit(jobs: Jobs, work: Work, ranks: int = 1, seconds: float = SECONDS) -> Job:
-    return accepted(jobs, work, "ada", ranks, seconds).job
+def submit(jobs: Jobs, question: Question, ranks: int = 1, seconds: float = SECONDS) -> Job:
+    return accepted(jobs, question, "ada", ranks, seconds).job
 
 
 def finished(jobs: Jobs, job: Job) -> Callable[[], bool]:
@@ -220,22 +223,22 @@ def test_a_job_that_is_always_cut_short_is_given_up(jobs, store):
     ("kind", "status", "output", "last_words", "expected"),
     [
         (
-            Kind.SCENE,
+            "scene",
             2,
             "",
             "ensemble: flow.rate: no",
             JobResult(JobStatus.FAILED, "ensemble: flow.rate: no"),
         ),
-        (Kind.SCENE, 1, "", "", JobResult(JobStatus.FAILED, "ended with status 1")),
+        ("scene", 1, "", "", JobResult(JobStatus.FAILED, "ended with status 1")),
         (
-            Kind.SCENE,
+            "scene",
             1,
             json.dumps({"outcome": "failed", "failure": "underflow"}),
             "warning",
             JobResult(JobStatus.FAILED, "underflow"),
         ),
         (
-            Kind.SCENE,
+            "scene",
             0,
             json.dumps({"outcome": "separated", "failure": None}),
             "",

@@ -16,7 +16,7 @@ from scipy.special import ellipe
 from ensemble.config.documents import load_scene, load_study, preset_names
 from ensemble.config.geometric_grid import GeometricGrid
 from ensemble.config.study import Study
-from ensemble.search.critical_value import Side, Status
+from ensemble.search.critical_value import SearchStatus, Side
 from ensemble.search.study_search import critical_value_search, expected_bracket, side_of
 from solver.analysis.run import Outcome
 from solver.scene import Adhesion, Scene, Shear, Trap
@@ -153,7 +153,7 @@ def test_a_whole_study_on_a_known_boundary_takes_few_runs() -> None:
         while (value := search.ask()) is not None:
             search.tell(value, Side.LOW if value < critical else Side.HIGH)
             asked += 1
-        assert search.status is Status.CONVERGED
+        assert search.status is SearchStatus.CONVERGED
         low, high = search.bracket
         assert low is not None
         assert high is not None

@@ -155,7 +155,7 @@ import solver.simulation.simulate
 from ensemble.search.task_queue import Task
 from ensemble.config.run_key import run_key
 from ensemble.mpi.world import abort_guard, world
-from ensemble.mpi.run_study import carry_out
+from ensemble.mpi.run_study import run_queue
 from ensemble.mpi.store_on_ranks import store_on_ranks
 from ensemble.config.documents import load_scene
 
@@ -182,7 +182,7 @@ class MadeUpQueue:
         assert task.scene == LONG
         self.cancellations += 1
 
-    def pointless_tasks(self):
+    def unneeded_tasks(self):
         return (self.long,) if self.answered and not self.cancellations else ()
 
     @property
@@ -197,8 +197,8 @@ if communicator.Get_rank() == int(sys.argv[2]):
     solver.simulation.simulate.simulate = broken
 with abort_guard(communicator):
     with store_on_ranks(communicator, path) as store:
-        queue, cost = carry_out(communicator, 2, store, MadeUpQueue, lambda *_: None, lambda queue: queue)
-    print(f"runs {cost.runs}, cancelled {queue.cancellations};", end=" ")
+        queue, usage = run_queue(communicator, 2, store, MadeUpQueue, lambda *_: None, lambda queue: queue)
+    print(f"runs {usage.runs}, cancelled {queue.cancellations};", end=" ")
 """
 
 

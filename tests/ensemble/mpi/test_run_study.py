@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 
 from ensemble.config.documents import load_study
 from ensemble.config.study import Study
-from ensemble.mpi.usage import Usage
+from ensemble.mpi.usage import UsageMeter
 from ensemble.search.point_search import SearchRun
 from ensemble.search.study_planner import StudyPlanner
 from ensemble.store import Store
@@ -66,9 +66,9 @@ def run_study(
         task = out.pop(choose(len(out)))
         made.append(task)
         planner.answer(task, answer(task))
-        for pointless in planner.pointless_tasks():
-            out.remove(pointless)
-            planner.cancelled(pointless)
+        for unneeded in planner.unneeded_tasks():
+            out.remove(unneeded)
+            planner.cancelled(unneeded)
     assert not out
     return made
 
@@ -164,7 +164,7 @@ def test_a_slow_run_near_the_critical_value_is_not_waited_for() -> None:
     low, high = planner.boundary().points[0].bracket
     assert low is not None
     assert high is not None
-    if slow in planner.pointless_tasks():
+    if slow in planner.unneeded_tasks():
         assert planner.done
     else:
         assert low < slow.value < high < low * (1 + one_point.search.tolerance) ** 2
@@ -194,22 +194,22 @@ def test_finished_searches_tell_the_later_ones_where_to_begin() -> None:
 
 def test_busy_time_counts_until_a_rank_has_nothing_left_to_run() -> None:
     now = 0.0
-    usage = Usage(2, lambda: now)
+    usage = UsageMeter(2, lambda: now)
     now = 10.0
-    usage.ran(0, 9.0)
-    usage.ran(1, 5.0)
-    usage.idle(1)
+    usage.record_run(0, 9.0)
+    usage.record_run(1, 5.0)
+    usage.record_idle(1)
     now = 12.0
-    usage.idle(0)  # something was found for it after all
+    usage.record_idle(0)  # something was found for it after all
     now = 20.0
-    usage.ran(0, 10.0)
-    usage.idle(1)
+    usage.record_run(0, 10.0)
+    usage.record_idle(1)
     now = 30.0
-    usage.ran(1, 18.0)  # the last eight seconds of it are after the other rank had run dry
-    usage.idle(2)
+    usage.record_run(1, 18.0)  # the last eight seconds of it are after the other rank had run dry
+    usage.record_idle(2)
     # ran() is told the moment a run ends, so these two add up to 19 and 5 + 8 of 20 seconds
     assert usage.fractions() == pytest.approx((19 / 20, 13 / 20))
-    assert Usage(2, lambda: 0.0).fractions() == ()
+    assert UsageMeter(2, lambda: 0.0).fractions() == ()
 
 
 # From here on: real ranks, real simulations, real kills.

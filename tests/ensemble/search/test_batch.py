@@ -78,9 +78,9 @@ with abort_guard(communicator):
     ]
     with store_on_ranks(communicator, Path(sys.argv[1])) as store:
         seen = []
-        cost = run_batch(communicator, scenes, store, lambda standing: seen.append(set(standing.running)))
+        usage = run_batch(communicator, scenes, store, lambda progress: seen.append(set(progress.running)))
         if communicator.Get_rank() == 0:
-            print(json.dumps({"runs": cost.runs, "most": max(map(len, seen)), "busy": cost.busy_fractions}))
+            print(json.dumps({"runs": usage.runs, "most": max(map(len, seen)), "busy": usage.busy_fractions}))
 """
 
 

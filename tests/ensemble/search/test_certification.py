@@ -44,7 +44,7 @@ def finish(certifying: Certification, physics: Physics, workers: int = 1, order:
             certifying.tell(value, physics(GRID.index(value)))
             answers += 1
     assert certifying.ask() is None
-    assert certifying.pointless() == frozenset(pending)
+    assert certifying.unneeded() == frozenset(pending)
     return answers
 
 
@@ -88,14 +88,14 @@ def any_physics(draw: st.DrawFn) -> Physics:
     order=st.none() | st.randoms(use_true_random=False),
     told=st.sets(indices, max_size=10),
 )
-def test_verdict_and_bracket_depend_on_the_physics_alone(
+def test_result_and_bracket_depend_on_the_physics_alone(
     low: int, physics: Physics, workers: int, order: Random | None, told: set[int]
 ) -> None:
     certifying = certification(low)
     for index in told:
         certifying.tell(GRID.value(index), physics(index))
     finish(certifying, physics, workers, order)
-    assert (certifying.verdict, certifying.bracket) == expected(low, physics)
+    assert (certifying.result, certifying.bracket) == expected(low, physics)
 
 
 @pytest.mark.parametrize(
@@ -107,7 +107,7 @@ def test_a_shifted_threshold_widens_the_bracket_on_its_side_only(
 ) -> None:
     certifying = certification(10)
     made = finish(certifying, lambda index: Side.LOW if index < 11 + shift else Side.HIGH)
-    assert certifying.verdict is CertificationResult.CONVERGED
+    assert certifying.result is CertificationResult.CONVERGED
     assert certifying.bracket == tuple(map(GRID.value, bracket))
     assert made == answers
 
@@ -116,11 +116,11 @@ def test_an_end_without_an_answer_moves_on() -> None:
     silent = {10: Side.FAILED, 9: Side.UNDECIDED}
     certifying = certification(10)
     finish(certifying, lambda index: silent.get(index, Side.LOW if index < 11 else Side.HIGH))
-    assert certifying.verdict is CertificationResult.CONVERGED
+    assert certifying.result is CertificationResult.CONVERGED
     assert certifying.bracket == (GRID.value(8), GRID.value(11))
 
 
-def test_both_ends_are_tried_at_once_and_a_lost_end_makes_the_other_pointless() -> None:
+def test_both_ends_are_tried_at_once_and_a_lost_end_makes_the_other_unneeded() -> None:
     certifying = certification(INDICES[0])
     low, high = certifying.ask(), certifying.ask()
     assert (low, high) == (GRID.value(INDICES[0]), GRID.value(INDICES[1]))
@@ -128,8 +128,8 @@ def test_both_ends_are_tried_at_once_and_a_lost_end_makes_the_other_pointless() 
     assert certifying.ends_left == 2
     assert low is not None
     certifying.tell(low, Side.HIGH)
-    assert certifying.verdict is CertificationResult.UNCERTIFIED
-    assert certifying.pointless() == {high}
+    assert certifying.result is CertificationResult.UNCERTIFIED
+    assert certifying.unneeded() == {high}
 
 
 def test_finer_means_twice_the_points_and_a_tenth_of_the_tolerance() -> None:

@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ensemble.cli.result_tables import boundary_cells, boundary_columns
 from ensemble.config.documents import load_study
 from ensemble.config.geometric_grid import GeometricGrid
 from ensemble.config.run_key import run_key
 from ensemble.config.study import Study
+from ensemble.display.result_tables import boundary_cells, boundary_columns
 from ensemble.search.boundary import BoundaryPoint
 from ensemble.search.point_search import SearchRun
 from ensemble.search.study_planner import StudyPlanner
@@ -83,9 +83,9 @@ def run_study(
             break
         made.append(out.pop(choose(len(out))))
         planner.answer(made[-1], answer(made[-1]))
-        for pointless in planner.pointless_tasks():
-            out.remove(pointless)
-            planner.cancelled(pointless)
+        for unneeded in planner.unneeded_tasks():
+            out.remove(unneeded)
+            planner.cancelled(unneeded)
     assert not out
     assert planner.next_task() is None
     return made
@@ -222,12 +222,12 @@ def test_a_late_answer_that_contradicts_the_search_ends_its_certification() -> N
     while (task := planner.next_task()) is not None and not is_finer(task):
         planner.answer(task, physics(task))
     assert task is not None
-    assert late in planner.pointless_tasks()
+    assert late in planner.unneeded_tasks()
     above = late.value > task.value
     planner.answer(late, Outcome.SEPARATED if above else Outcome.BOUND)
     assert planner.boundary().points[0].status == "non-monotone"
     assert planner.done
-    assert planner.pointless_tasks() == (task,)
+    assert planner.unneeded_tasks() == (task,)
     planner.cancelled(task)
     assert planner.next_task() is None
 
@@ -265,7 +265,7 @@ def test_a_search_that_others_finish_meanwhile_is_certified_at_once() -> None:
     task = planner.next_task()
     assert task is not None
     assert is_finer(task)
-    assert planner.pointless_tasks() == (out,)
+    assert planner.unneeded_tasks() == (out,)
 
 
 def test_tables_name_the_numerics_and_old_documents_are_read() -> None:

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ensemble.config.geometric_grid import GeometricGrid
-from ensemble.search.critical_value import ZONE_EDGE, CriticalValueSearch, Side, Status
+from ensemble.search.critical_value import ZONE_EDGE, CriticalValueSearch, SearchStatus, Side
 
 GRID = GeometricGrid(0.01)
 LIMITS = (0.05, 5.0)
@@ -60,7 +60,7 @@ def finish(
             else:
                 search.tell(value, physics(GRID.index(value)))
         if cancel:
-            for value in search.pointless():
+            for value in search.unneeded():
                 search.withdraw(value)
                 pending.remove(value)
     assert search.ask() is None
@@ -71,7 +71,9 @@ def finish(
     return run_study
 
 
-def expected(physics: Physics, indices: range = INDICES) -> tuple[Status, tuple[float | None, float | None]]:
+def expected(
+    physics: Physics, indices: range = INDICES
+) -> tuple[SearchStatus, tuple[float | None, float | None]]:
     """What the physics says, by looking at every value."""
     low = max((index for index in indices if physics(index) is Side.LOW), default=indices[0] - 1)
     high = min((index for index in indices if physics(index) is Side.HIGH), default=indices[-1] + 1)
@@ -81,8 +83,8 @@ def expected(physics: Physics, indices: range = INDICES) -> tuple[Status, tuple[
     )
     if high - low > 1:
         failed = Side.FAILED in (physics(low + 1), physics(high - 1))
-        return (Status.FAILED if failed else Status.UNDECIDED), bracket
-    return (Status.UNBRACKETED if None in bracket else Status.CONVERGED), bracket
+        return (SearchStatus.FAILED if failed else SearchStatus.UNDECIDED), bracket
+    return (SearchStatus.UNBRACKETED if None in bracket else SearchStatus.CONVERGED), bracket
 
 
 @st.composite
@@ -131,7 +133,7 @@ def test_bracket_depends_on_the_physics_alone(
         search.tell(GRID.value(index), physics(index))
     run_study = finish(search, physics, workers=workers, order=order, cancel=cancel)
     assert (search.status, search.bracket) == expected(physics)
-    assert search.offending == ()
+    assert search.contradictions == ()
     if not cancel:
         assert len(set(run_study.asked)) == len(run_study.asked)
     assert not {GRID.index(value) for value in run_study.asked} & told
@@ -185,7 +187,7 @@ def test_a_wide_zone_without_answers_is_closed_in_by_bisection() -> None:
     zone = range(-150, 50)
     search = CriticalValueSearch(GRID, LIMITS)
     run_study = finish(search, lambda index: Side.UNDECIDED if index in zone else threshold_at(0)(index))
-    assert search.status is Status.UNDECIDED
+    assert search.status is SearchStatus.UNDECIDED
     assert search.bracket == (GRID.value(-151), GRID.value(50))
     assert len(run_study.asked) <= 2 * math.log2(len(INDICES)) + 2 * ZONE_EDGE
 
@@ -197,14 +199,14 @@ def test_a_few_failures_on_both_sides_do_not_hide_the_critical_value() -> None:
         search.tell(GRID.value(index), Side.FAILED)
     search.tell(GRID.value(3), Side.HIGH)
     finish(search, threshold_at(0))
-    assert search.status is Status.CONVERGED
+    assert search.status is SearchStatus.CONVERGED
     assert search.bracket == (GRID.value(-1), GRID.value(0))
 
 
 def test_a_scene_that_always_fails_is_given_up_after_few_runs() -> None:
     search = CriticalValueSearch(GRID, LIMITS)
     run_study = finish(search, lambda index: Side.FAILED)
-    assert search.status is Status.FAILED
+    assert search.status is SearchStatus.FAILED
     assert search.bracket == (None, None)
     assert len(run_study.asked) <= 2 * math.log2(len(INDICES)) + 2 * ZONE_EDGE
 
@@ -222,48 +224,50 @@ def test_a_low_above_a_high_is_reported_whatever_the_order(sides: dict[int, Side
     search = CriticalValueSearch(GRID, LIMITS)
     for index in order.sample(sorted(sides), len(sides)):
         search.tell(GRID.value(index), sides[index])
-    assert (search.status is Status.NON_MONOTONE) == contradictory
+    assert (search.status is SearchStatus.NON_MONOTONE) == contradictory
     if contradictory:
         low, high = search.bracket
         assert search.done
         assert search.ask() is None
-        assert {GRID.value(max(lows)), GRID.value(min(highs))} <= set(search.offending)
+        assert {GRID.value(max(lows)), GRID.value(min(highs))} <= set(search.contradictions)
         assert all(
             GRID.value(index) >= (high or math.inf)
             for index in highs
-            if GRID.value(index) not in search.offending
+            if GRID.value(index) not in search.contradictions
         )
         assert all(
-            GRID.value(index) <= (low or 0.0) for index in lows if GRID.value(index) not in search.offending
+            GRID.value(index) <= (low or 0.0)
+            for index in lows
+            if GRID.value(index) not in search.contradictions
         )
 
 
-def test_offending_values_and_the_bracket_around_them() -> None:
+def test_contradictions_and_the_bracket_around_them() -> None:
     search = CriticalValueSearch(GRID, LIMITS)
     sides = {-100: Side.LOW, -50: Side.HIGH, 0: Side.UNDECIDED, 20: Side.LOW, 60: Side.HIGH, 90: Side.HIGH}
     for index, side in sides.items():
         search.tell(GRID.value(index), side)
-    assert search.status is Status.NON_MONOTONE
+    assert search.status is SearchStatus.NON_MONOTONE
     assert search.bracket == (GRID.value(-100), GRID.value(60))
-    assert search.offending == (GRID.value(-50), GRID.value(20))
+    assert search.contradictions == (GRID.value(-50), GRID.value(20))
 
 
-def test_an_answer_makes_the_speculation_beyond_it_pointless() -> None:
+def test_an_answer_makes_the_speculation_beyond_it_unneeded() -> None:
     search = CriticalValueSearch(GRID, LIMITS)
     middle, *others = (search.ask() for _ in range(7))
     assert middle is not None
-    assert search.pointless() == frozenset()
+    assert search.unneeded() == frozenset()
     search.tell(middle, Side.HIGH)
-    assert search.pointless() == {value for value in others if value is not None and value > middle}
+    assert search.unneeded() == {value for value in others if value is not None and value > middle}
 
 
-def test_a_contradiction_makes_every_pending_value_pointless() -> None:
+def test_a_contradiction_makes_every_pending_value_unneeded() -> None:
     search = CriticalValueSearch(GRID, LIMITS)
     pending = {search.ask() for _ in range(3)}
     search.tell(GRID.value(INDICES[0]), Side.HIGH)
     search.tell(GRID.value(INDICES[-1]), Side.LOW)
     assert search.bracket == (None, None)
-    assert search.pointless() == pending
+    assert search.unneeded() == pending
 
 
 def test_a_withdrawn_value_is_asked_again() -> None:
@@ -286,17 +290,17 @@ def test_everything_useful_pending_leaves_nothing_to_ask() -> None:
     assert not search.done
 
 
-def test_reseeding_moves_the_first_ask_until_something_is_told() -> None:
+def test_another_guess_moves_the_first_value_until_there_is_an_answer() -> None:
     search = CriticalValueSearch(GRID, LIMITS)
-    search.reseed((0.9, 1.1))
+    search.replace_guess((0.9, 1.1))
     value = search.ask()
     assert value is not None
     assert value == pytest.approx(1.0, rel=0.02)
-    search.reseed((2.9, 3.1))
+    search.replace_guess((2.9, 3.1))
     assert search.ask() == pytest.approx(3.0, rel=0.02)
     search.tell(value, Side.LOW)
     with pytest.raises(ValueError, match="takes no other guess"):
-        search.reseed((0.9, 1.1))
+        search.replace_guess((0.9, 1.1))
 
 
 def test_refusals_name_what_is_wrong() -> None:

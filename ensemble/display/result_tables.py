@@ -3,23 +3,44 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.table import Column, Table
 
-from ensemble.search.boundary import Boundary, BoundaryPoint
-from ensemble.store.run_record import RunSummary
+if TYPE_CHECKING:
+    from ensemble.search.boundary import Boundary, BoundaryPoint
+    from ensemble.store.run_record import RunSummary
 
 _ABSENT = "–"
 
 
 def boundary_columns(points: Sequence[BoundaryPoint]) -> list[str]:
-    """Headings for `boundary_cells`."""
+    """Return the headings of the columns that `boundary_cells` fills.
+
+    Parameters
+    ----------
+    points : sequence of BoundaryPoint
+        At least one point of the boundary.
+
+    Returns
+    -------
+    list of str
+    """
     return [*points[0].parameters, "critical value", "bracket", "outcomes", "status", "certified by", "runs"]
 
 
 def boundary_cells(point: BoundaryPoint) -> list[str]:
-    """One point of a boundary as the cells of a row."""
+    """Return one point of a boundary as the cells of a row.
+
+    Parameters
+    ----------
+    point : BoundaryPoint
+        The point.
+
+    Returns
+    -------
+    list of str
+    """
     return [
         *(_number(value) for value in point.parameters.values()),
         _number(point.critical_value),
@@ -32,7 +53,17 @@ def boundary_cells(point: BoundaryPoint) -> list[str]:
 
 
 def bracket_text(point: BoundaryPoint) -> str:
-    """The two ends of a bracket, a question mark where one is unknown."""
+    """Write the two ends of a bracket, with a question mark where an end is unknown.
+
+    Parameters
+    ----------
+    point : BoundaryPoint
+        The point that has the bracket.
+
+    Returns
+    -------
+    str
+    """
     return " – ".join("?" if end is None else f"{end:.6g}" for end in point.bracket)
 
 
@@ -42,15 +73,35 @@ def _certifying_numerics(point: BoundaryPoint) -> str:
 
 
 def boundary_table(boundary: Boundary) -> Table:
-    """One boundary, a row for each of its points."""
+    """Return a table of a boundary, with a row for each of its points.
+
+    Parameters
+    ----------
+    boundary : Boundary
+        The boundary.
+
+    Returns
+    -------
+    Table
+    """
     table = Table(*boundary_columns(boundary.points), title=boundary.name)
     for point in boundary.points:
         table.add_row(*boundary_cells(point))
     return table
 
 
-def run_table(document: Mapping[str, Any]) -> Table:
-    """One document, a row for each of its fields; those of nested ones have dotted names."""
+def fields_table(document: Mapping[str, Any]) -> Table:
+    """Return a table of a document, with a row for each of its fields; those of inner tables by dotted path.
+
+    Parameters
+    ----------
+    document : mapping
+        Nested tables, such as the results of a run.
+
+    Returns
+    -------
+    Table
+    """
     table = Table(show_header=False)
     for name, value in _leaves(document):
         table.add_row(name, _number(value))
@@ -58,7 +109,17 @@ def run_table(document: Mapping[str, Any]) -> Table:
 
 
 def runs_table(summaries: Sequence[RunSummary]) -> Table:
-    """Runs, one a row."""
+    """Return a table of runs, with a row for each.
+
+    Parameters
+    ----------
+    summaries : sequence of RunSummary
+        Of the runs.
+
+    Returns
+    -------
+    Table
+    """
     table = Table(_whole("run"), "outcome", "flow", "rate", "hamaker")
     for summary in summaries:
         flow, adhesion = summary.scene.flow, summary.scene.adhesion
@@ -73,7 +134,17 @@ def runs_table(summaries: Sequence[RunSummary]) -> Table:
 
 
 def boundaries_table(boundaries: Sequence[Boundary]) -> Table:
-    """Boundaries, one a row."""
+    """Return a table of boundaries, with a row for each.
+
+    Parameters
+    ----------
+    boundaries : sequence of Boundary
+        The boundaries.
+
+    Returns
+    -------
+    Table
+    """
     table = Table(_whole("boundary"), "name", "points", "converged", "certified", "updated")
     for boundary in boundaries:
         converged = sum(point.status == "converged" for point in boundary.points)

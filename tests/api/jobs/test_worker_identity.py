@@ -6,15 +6,15 @@ import subprocess
 import sys
 import time
 
-from api.jobs.worker_name import has_died, own_name
+from api.jobs.worker_identity import has_died, own_identity
 from tests.api.processes import run_python
 
-NAMING = "from api.jobs.worker_name import own_name; print(own_name(), flush=True)"
+NAMING = "from api.jobs.worker_identity import own_identity; print(own_identity(), flush=True)"
 WAITING = f"{NAMING}; input()"
 
 
 def test_a_worker_that_runs_has_not_died():
-    assert not has_died(own_name())
+    assert not has_died(own_identity())
 
 
 def test_a_worker_has_died_as_soon_as_it_is_killed():
@@ -30,7 +30,7 @@ def test_a_worker_has_died_as_soon_as_it_is_killed():
 
 
 def test_another_process_of_the_same_number_is_another_one():
-    place, number, started = own_name().split(" ")
+    place, number, started = own_identity().split(" ")
     assert has_died(f"{place} {number} {int(started) - 1}")
 
 

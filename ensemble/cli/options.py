@@ -1,0 +1,51 @@
+"""Options that several commands share."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+class ProgressFormat(StrEnum):
+    """Whom progress is shown to: people, or a program."""
+
+    TEXT = "text"
+    JSON = "json"
+
+
+def _preset_names() -> list[str]:
+    from ensemble.config.documents import preset_names
+
+    return list(preset_names())
+
+
+Document = Annotated[
+    str, typer.Argument(help="Name of a preset, or a TOML file.", autocompletion=_preset_names)
+]
+Changes = Annotated[
+    list[str],
+    typer.Option(
+        "--set", metavar="PATH=VALUE", help="Change a field: dotted path and TOML value.  Repeatable."
+    ),
+]
+StorePath = Annotated[Path, typer.Option("--store", metavar="DIR", help="Directory of the store.")]
+Filters = Annotated[
+    list[str],
+    typer.Option(metavar="CONDITION", help="For example flow.rate>=0.5 or outcome=bound.  Repeatable."),
+]
+RanksPerRun = Annotated[
+    str | None,
+    typer.Option(
+        "--ranks-per-run",
+        metavar="G|auto",
+        help="How many ranks compute a run together; auto: as many as pay off for the scene.",
+    ),
+]
+ProgressAs = Annotated[
+    ProgressFormat,
+    typer.Option("--progress", help="How standard error shows progress: for people, or in lines of JSON."),
+]
+AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]

@@ -1,0 +1,141 @@
+"""Commands that answer questions: one for each kind of question.
+
+A command of a kind is a signature, and one call of `answer_and_print`.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+
+import typer
+
+from ensemble.cli.options import AsJson, Changes, Document, ProgressAs, ProgressFormat, RanksPerRun, StorePath
+from ensemble.cli.printing import print_json, print_table
+from ensemble.config.defaults import DEFAULT_STORE, DEFAULT_STUDY
+
+if TYPE_CHECKING:
+    from ensemble.questions import Answer, Question
+
+
+def bisect(
+    study: Document = DEFAULT_STUDY,
+    changes: Changes = [],  # noqa: B006  typer copies it
+    store: StorePath = DEFAULT_STORE,
+    tolerance: Annotated[float | None, typer.Option(help="Relative width of the brackets.")] = None,
+    certify: Annotated[
+        bool, typer.Option("--certify", help="Run both ends of every bracket again at finer numerics.")
+    ] = False,
+    ranks_per_run: RanksPerRun = None,
+    progress: ProgressAs = ProgressFormat.TEXT,
+    as_json: AsJson = False,
+) -> None:
+    """Trace a boundary, on all ranks, running only what the store does not have.
+
+    Each rank makes runs of its own unless ranks are asked to share them.  The exit status is 0 only if every
+    search converged and every bracket that was to be certified is.
+    """
+    if tolerance is not None:
+        changes = [*changes, f"search.tolerance={tolerance!r}"]
+    if certify:
+        changes = [*changes, "search.certify=true"]
+    answer_and_print("study", study, changes, store, ranks_per_run, progress, as_json)
+
+
+def run(
+    scene: Document,
+    changes: Changes = [],  # noqa: B006
+    store: Annotated[Path | None, typer.Option(metavar="DIR", help="Keep the run in this store.")] = None,
+    ranks_per_run: RanksPerRun = None,
+    progress: ProgressAs = ProgressFormat.TEXT,
+    as_json: AsJson = False,
+) -> None:
+    """Simulate one scene on all ranks together, unless the store has the run.
+
+    The exit status is 1 if it failed numerically.
+    """
+    answer_and_print("scene", scene, changes, store, ranks_per_run, progress, as_json)
+
+
+def answer_and_print(
+    kind: str,
+    name_or_path: str,
+    changes: list[str],
+    store: Path | None,
+    ranks_per_run: str | None,
+    progress: ProgressFormat,
+    as_json: bool,
+) -> NoReturn:
+    """Answer a question on all ranks, print the answer and exit; with status 1 if it is not complete.
+
+    Collective.
+
+    Parameters
+    ----------
+    kind : str
+        Of the question.
+    name_or_path : str
+        Name of a preset, else a TOML file.
+    changes : list of str
+        ``path=value``, made before the document is checked.
+    store : Path or None
+        Directory of the store that keeps the runs, which is created if there is none.
+    ranks_per_run : str or None
+        A number or ``auto``; None: one if the question has many runs, all if it has one.
+    progress : ProgressFormat
+        For whom progress is shown.
+    as_json : bool
+        Whether the answer is printed as one JSON document.
+
+    Raises
+    ------
+    BadInput
+        On every rank, before any work starts.
+    typer.Exit
+        When the answer has been printed.
+    """
+    from ensemble.questions import kind_named
+
+    for_program = progress is ProgressFormat.JSON
+    answer = _answer(kind_named(kind), name_or_path, changes, store, ranks_per_run, for_program)
+    if answer is None:
+        raise typer.Exit(0)
+    if as_json:
+        print_json(answer.json_document())
+    else:
+        print_table(answer.table())
+        if answer.footer is not None:
+            print(answer.footer)
+    raise typer.Exit(0 if answer.complete else 1)
+
+
+def _answer(
+    kind: type[Question[Any]],
+    name_or_path: str,
+    changes: list[str],
+    store: Path | None,
+    ranks_per_run: str | None,
+    for_program: bool,
+) -> Answer | None:
+    """Prepare on the first rank, so that what is refused leaves no trace; then answer on all of them."""
+    from rich.console import Console
+
+    from ensemble.config.overrides import parse_override
+    from ensemble.errors import refusing
+    from ensemble.mpi.groups import chosen_ranks
+    from ensemble.mpi.world import abort_guard, launched_size, on_root, world
+
+    communicator = world() if kind.has_many_runs or launched_size() > 1 else None
+    size = 1 if communicator is None else communicator.Get_size()
+
+    def prepare() -> tuple[Question[Any], int]:
+        with refusing():
+            question = kind.load(name_or_path, dict(map(parse_override, changes)))
+            requested = ranks_per_run or ("1" if kind.has_many_runs else str(size))
+            ranks = chosen_ranks(requested, question.scene, size)
+        return question, ranks
+
+    with abort_guard(communicator):
+        question, ranks = on_root(communicator, prepare)
+        with kind.progress(Console(stderr=True), for_program) as on_change:
+            return question.answer(communicator, store, ranks, on_change)

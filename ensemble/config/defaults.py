@@ -1,0 +1,9 @@
+"""What is used when nothing else is said."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+DEFAULT_STORE: Final = Path("ensemble-store")
+DEFAULT_STUDY: Final = "critical-hamaker"

@@ -1,0 +1,1 @@
+"""What people and programs see while work goes on and when it is done: progress, and tables of results."""

@@ -1,0 +1,221 @@
+"""Shows on standard error how far a job or a simulation has come.
+
+On a terminal it is a table or a bar that changes in place, elsewhere (a log file, a batch job) plain lines.
+For a program that has started this one, it is a line of JSON now and then.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from datetime import timedelta
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console, Group
+from rich.live import Live
+from rich.progress import Progress
+from rich.table import Table
+from rich.text import Text
+
+from ensemble.display.progress_line import ProgressLine
+from ensemble.display.result_tables import boundary_cells, boundary_columns, bracket_text
+
+if TYPE_CHECKING:
+    from ensemble.mpi.dispatcher import JobProgress
+    from ensemble.mpi.run_study import Snapshot
+
+# A context manager that gives a function to call whenever something has changed.
+Display = AbstractContextManager[Callable[..., None]]
+
+
+@contextmanager
+def job_lines(console: Console) -> Iterator[Callable[[JobProgress[Any]], None]]:
+    """Give a function that prints the progress of a job as a `ProgressLine`.
+
+    Parameters
+    ----------
+    console : Console
+        Where it is printed.
+
+    Yields
+    ------
+    callable
+        Takes the progress of the job.
+    """
+
+    def show(progress: JobProgress[Any]) -> None:
+        elapsed, left = progress.elapsed, progress.seconds_left
+        fraction = 0.0 if left is None else elapsed / (elapsed + left)
+        _print_line(console, fraction, progress_text(progress))
+
+    yield show
+
+
+@contextmanager
+def job_progress(console: Console) -> Iterator[Callable[[JobProgress[Any]], None]]:
+    """Give a function that shows the progress of a job: a live line on a terminal, plain lines elsewhere.
+
+    Parameters
+    ----------
+    console : Console
+        Where it is shown.
+
+    Yields
+    ------
+    callable
+        Takes the progress of the job.
+    """
+    if console.is_terminal:
+        with Live(console=console) as live:
+            yield lambda progress: live.update(Text(progress_text(progress)))
+    else:
+        yield lambda progress: console.print(progress_text(progress), soft_wrap=True, highlight=False)
+
+
+@contextmanager
+def study_lines(console: Console) -> Iterator[Callable[[Snapshot], None]]:
+    """Give a function that prints the progress of a study as a `ProgressLine`.
+
+    Parameters
+    ----------
+    console : Console
+        Where it is printed.
+
+    Yields
+    ------
+    callable
+        Takes the latest snapshot of the study.
+    """
+    with job_lines(console) as show:
+        yield lambda snapshot: show(snapshot.progress)
+
+
+@contextmanager
+def study_progress(console: Console) -> Iterator[Callable[[Snapshot], None]]:
+    """Give a function that shows how far a study has come: all of its points, or those that have changed.
+
+    Parameters
+    ----------
+    console : Console
+        Where it is shown.
+
+    Yields
+    ------
+    callable
+        Takes the latest snapshot of the study.
+    """
+    if console.is_terminal:
+        with Live(console=console) as live:
+            yield lambda snapshot: live.update(
+                Group(_table(snapshot), Text(progress_text(snapshot.progress)))
+            )
+    else:
+        yield _ChangedPoints(console).show
+
+
+@contextmanager
+def run_lines(console: Console) -> Iterator[Callable[[float, float], None]]:
+    """Give a function that prints a `ProgressLine` whenever a simulation has come a percent further.
+
+    Parameters
+    ----------
+    console : Console
+        Where it is printed.
+
+    Yields
+    ------
+    callable
+        Takes the time that the simulation has reached and its latest end.
+    """
+    shown = -1
+
+    def show(time: float, end: float) -> None:
+        nonlocal shown
+        percent = int(100 * time / end)
+        if percent != shown:
+            shown = percent
+            _print_line(console, min(time / end, 1.0), f"time {time:g} of {end:g}")
+
+    yield show
+
+
+@contextmanager
+def run_progress(console: Console) -> Iterator[Callable[[float, float], None]]:
+    """Give a function that shows a bar for a simulation; it shows nothing unless on a terminal.
+
+    Parameters
+    ----------
+    console : Console
+        Where it is shown.
+
+    Yields
+    ------
+    callable
+        Takes the time that the simulation has reached and its latest end.
+    """
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
+        bar = progress.add_task("simulating")
+        yield lambda time, end: progress.update(bar, completed=time, total=end)
+
+
+def progress_text(progress: JobProgress[Any]) -> str:
+    """Say in one line how far the runs of a job have come.
+
+    Parameters
+    ----------
+    progress : JobProgress
+        Of the job.
+
+    Returns
+    -------
+    str
+    """
+    known = f" and {progress.known} from the store" if progress.known else ""
+    return (
+        f"{progress.runs} runs{known}, {len(progress.running)} running, "
+        f"{_duration(progress.elapsed)} elapsed, {_time_left(progress)}"
+    )
+
+
+def _print_line(console: Console, fraction: float, message: str) -> None:
+    line = ProgressLine(fraction=fraction, message=message)
+    console.print(line.model_dump_json(), soft_wrap=True, highlight=False, markup=False)
+
+
+def _table(snapshot: Snapshot) -> Table:
+    points = snapshot.boundary.points
+    table = Table(*boundary_columns(points), "running")
+    for point in points:
+        (at,) = point.parameters.values()
+        values = sorted(task.value for task in snapshot.progress.running.values() if task.sweep_value == at)
+        table.add_row(*boundary_cells(point), ", ".join(f"{value:.6g}" for value in values))
+    return table
+
+
+def _time_left(progress: JobProgress[Any]) -> str:
+    if progress.seconds_left is None:
+        return "time left unknown"
+    return f"about {_duration(progress.seconds_left)} left"
+
+
+def _duration(seconds: float) -> str:
+    return str(timedelta(seconds=round(seconds)))
+
+
+class _ChangedPoints:
+    """Prints one line for each change of a bracket or a status, with the progress of the whole study."""
+
+    def __init__(self, console: Console) -> None:
+        self._console = console
+        self._shown: dict[float, str] = {}
+
+    def show(self, snapshot: Snapshot) -> None:
+        """Print what has changed since the last snapshot."""
+        for point in snapshot.boundary.points:
+            ((name, at),) = point.parameters.items()
+            line = f"{name} {at:g}: {bracket_text(point)} {point.status}"
+            if point.runs and line != self._shown.get(at):
+                self._shown[at] = line
+                self._console.print(
+                    f"{line} ({progress_text(snapshot.progress)})", soft_wrap=True, highlight=False
+                )

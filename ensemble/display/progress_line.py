@@ -1,0 +1,22 @@
+"""Progress as a program reads it: lines of JSON."""
+
+from __future__ import annotations
+
+from pydantic import BaseModel, ConfigDict, Field
+
+
+class ProgressLine(BaseModel):
+    """How far a job or a simulation has come, in one line of JSON.
+
+    Attributes
+    ----------
+    fraction : float
+        From 0 to 1.
+    message : str
+        The same for people.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    fraction: float = Field(ge=0, le=1)
+    message: str

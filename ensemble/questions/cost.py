@@ -1,0 +1,92 @@
+"""What an answer may cost: points × vesicles × time to simulate, over all runs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from solver.scene import Scene
+
+# What a run may record: it is held in memory until the run ends.
+MOST_RECORDS = 1_000_000
+MOST_RECORDED_POINTS = 100_000_000
+
+_AUTOMATIC_POINTS = 128  # what "auto" is counted as: most scenes end with fewer
+_CONTRAST = 8.0  # how much longer a step takes with a viscosity contrast: at 64 points 5 to 9 times, measured
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What an answer costs at most.
+
+    Attributes
+    ----------
+    runs : int
+        How many runs.
+    work : float
+        Points × vesicles × time to simulate, over all runs.
+    """
+
+    runs: int
+    work: float
+
+
+def total_cost(planned_runs: Iterable[tuple[Scene, int]]) -> Cost:
+    """Add the cost of runs up.
+
+    Parameters
+    ----------
+    planned_runs : iterable of (Scene, int)
+        A scene and how many runs cost as much as its run.
+
+    Returns
+    -------
+    Cost
+
+    Raises
+    ------
+    ValueError
+        If a run would record more than it may; names the interval and its least value.
+    """
+    runs, work = 0, 0.0
+    for scene, count in planned_runs:
+        _limit_output(scene)
+        runs += count
+        work += count * run_work(scene)
+    return Cost(runs, work)
+
+
+def run_work(scene: Scene) -> float:
+    """Return the work of a run that goes on to the end of its extended horizon.
+
+    Parameters
+    ----------
+    scene : Scene
+        That is run.
+
+    Returns
+    -------
+    float
+        Points × vesicles × time; more with a viscosity contrast.
+    """
+    time = scene.horizon * scene.criteria.extensions
+    if scene.start.relaxed:
+        time += scene.start.horizon
+    if any(vesicle.viscosity_contrast != 1 for vesicle in scene.vesicles):
+        time *= _CONTRAST
+    return float(_points(scene) * time)
+
+
+def _points(scene: Scene) -> int:
+    points = scene.numerics.points
+    return len(scene.vesicles) * (_AUTOMATIC_POINTS if points == "auto" else points)
+
+
+def _limit_output(scene: Scene) -> None:
+    time = scene.horizon * scene.criteria.extensions
+    least = {"interval": time / MOST_RECORDS, "frame_interval": time * _points(scene) / MOST_RECORDED_POINTS}
+    for name, limit in least.items():
+        interval = getattr(scene.output, name)
+        if interval < limit and math.isfinite(limit):  # else the work is too much anyway
+            raise ValueError(f"output.{name}: {interval:g} — must be at least {limit:.3g} in so long a run")

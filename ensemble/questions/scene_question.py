@@ -1,0 +1,259 @@
+"""A single scene as a question: what becomes of it?"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ensemble.config.run_key import run_key
+from ensemble.questions.question import Answer, Question, StoredAnswer, StoredAnswers
+from ensemble.questions.size_limits import MOST_VESICLES, limit_vesicles
+from solver.scene import Scene
+
+if TYPE_CHECKING:
+    from mpi4py.MPI import Intracomm
+    from rich.console import Console
+    from rich.table import Table
+
+    from ensemble.display.progress import Display
+    from ensemble.store import Store
+    from ensemble.store.run_record import RunSummary
+
+_WORK = ("points", "steps", "rejected_steps", "rhs_evaluations", "wall_seconds")
+_RESULTS = (
+    "outcome",
+    "failure",
+    "time",
+    "period",
+    "effective_aspect_ratio",
+    "inclination_angle",
+    "gap",
+    "viscosity",
+    "energy",
+    "error",
+)
+
+
+class SceneQuestion(Question[Scene]):
+    """See `Question`.
+
+    Parameters
+    ----------
+    document : Scene
+        What is asked.
+    name : str
+        The preset that the scene was made from, or ``scene``.
+    """
+
+    kind = "scene"
+    document_type = Scene
+    marker = "horizon"
+    command = "run"
+    title = "Simulate one scene"
+    collection = "runs"
+    answer_title = "run"
+    has_many_runs = False
+    scene_path = ""
+
+    @classmethod
+    def check_size(cls, document: Any) -> None:
+        """See `Question`.
+
+        Parameters
+        ----------
+        document : object
+            What was sent.
+        """
+        limit_vesicles(document, MOST_VESICLES)
+
+    @property
+    def key(self) -> str:
+        """See `Question`."""
+        return run_key(self.document)
+
+    @property
+    def scene(self) -> Scene:
+        """See `Question`."""
+        return self.document
+
+    def planned_runs(self) -> list[tuple[Scene, int]]:
+        """See `Question`."""
+        return [(self.document, 1)]
+
+    def answer(
+        self,
+        communicator: Intracomm | None,
+        store: Path | None,
+        ranks_per_run: int,
+        on_change: Callable[[float, float], None],
+    ) -> Answer | None:
+        """See `Question`.
+
+        Parameters
+        ----------
+        communicator : Intracomm or None
+            All ranks; None if this process is alone, which needs no MPI library.
+        store : Path or None
+            Keeps the run; if it has it already, nothing is simulated.
+        ranks_per_run : int
+            How many ranks compute the run together.
+        on_change : callable
+            Takes the time that is reached and the latest end.
+
+        Returns
+        -------
+        Answer or None
+            On the first rank; None elsewhere.
+        """
+        from ensemble.mpi.single_run import single_run
+        from ensemble.mpi.store_on_ranks import store_on_ranks
+
+        with nullcontext() if store is None else store_on_ranks(communicator, store) as opened:
+            summary = single_run(communicator, self.document, opened, ranks_per_run, on_change)
+        return None if summary is None else _FinishedRun(summary)
+
+    @classmethod
+    def progress(cls, console: Console, for_program: bool) -> Display:
+        """See `Question`.
+
+        Parameters
+        ----------
+        console : Console
+            Where it is shown.
+        for_program : bool
+            Whether it is read by a program.
+
+        Returns
+        -------
+        context manager
+            Gives a function that takes the time that is reached and the latest end.
+        """
+        from ensemble.display.progress import run_lines, run_progress
+
+        return run_lines(console) if for_program else run_progress(console)
+
+    @classmethod
+    def summary(cls, json_document: Mapping[str, Any]) -> str:
+        """See `Question`.
+
+        Parameters
+        ----------
+        json_document : mapping
+            As `ensemble run --json` prints it.
+
+        Returns
+        -------
+        str
+            The outcome, or why the run failed.
+        """
+        return str(json_document["failure"] or json_document["outcome"])
+
+    @classmethod
+    def stored(cls, store: Store, name: str) -> StoredAnswer | None:
+        """See `Question`.
+
+        Parameters
+        ----------
+        store : Store
+            An open store.
+        name : str
+            Key of the run.
+
+        Returns
+        -------
+        StoredAnswer or None
+            The run.
+        """
+        return _StoredRun(store.summary(name), store) if store.contains(name) else None
+
+    @classmethod
+    def all_stored(cls, store: Store, where: Sequence[str]) -> StoredAnswers:
+        """See `Question`.
+
+        Parameters
+        ----------
+        store : Store
+            An open store.
+        where : sequence of str
+            Conditions on the scene and the results, such as ``flow.rate>=0.5``.
+
+        Returns
+        -------
+        StoredAnswers
+            The runs.
+        """
+        from ensemble.display.result_tables import runs_table
+
+        summaries = store.summaries(where)
+        return StoredAnswers([summary.document() for summary in summaries], runs_table(summaries))
+
+
+def run_document(summary: RunSummary) -> dict[str, Any]:
+    """Return the results and the cost of a run as JSON data.
+
+    Parameters
+    ----------
+    summary : RunSummary
+        Of the run.
+
+    Returns
+    -------
+    dict
+        A quantity that the scene does not have is None.
+    """
+    document = summary.document()
+    return (
+        {name: document[name] for name in _RESULTS}
+        | {name: document["work"][name] for name in _WORK}
+        | {"run_key": summary.key}
+    )
+
+
+@dataclass(frozen=True)
+class _FinishedRun(Answer):
+    """A run that has just been made, or that the store had already."""
+
+    summary: RunSummary
+
+    @property
+    def complete(self) -> bool:
+        from solver.analysis.run import Outcome
+
+        return self.summary.outcome is not Outcome.FAILED
+
+    def json_document(self) -> dict[str, Any]:
+        return run_document(self.summary)
+
+    def table(self) -> Table:
+        from ensemble.display.result_tables import fields_table
+
+        return fields_table(run_document(self.summary))
+
+
+@dataclass(frozen=True)
+class _StoredRun(StoredAnswer):
+    """A run of a store."""
+
+    summary: RunSummary
+    store: Store
+
+    def table(self) -> Table:
+        from ensemble.display.result_tables import fields_table
+
+        return fields_table(run_document(self.summary))
+
+    def draw(self, output: Path) -> None:
+        """Draw what happened in the run, or its movie."""
+        from ensemble.figures import run_figure, save
+        from ensemble.figures.figure_files import FIGURE_SUFFIXES, suffix_among
+        from ensemble.figures.movie import MOVIE_SUFFIXES, save_movie
+
+        suffix = suffix_among(output, (*FIGURE_SUFFIXES, *MOVIE_SUFFIXES))
+        run = self.store.load(self.summary.key)
+        if suffix in MOVIE_SUFFIXES:
+            save_movie(run, output)
+        else:
+            save(run_figure(run), output)

@@ -1,0 +1,278 @@
+"""A study as a question: where is the boundary between outcomes?"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import fmean
+from typing import TYPE_CHECKING, Any
+
+from ensemble.config.certifying_scene import certifying_scene
+from ensemble.config.study import Study
+from ensemble.questions.cost import run_work
+from ensemble.questions.question import Answer, Question, StoredAnswer, StoredAnswers
+from ensemble.questions.size_limits import (
+    MOST_SWEEP_VALUES,
+    MOST_VESICLES_SWEPT,
+    limit_elements,
+    limit_vesicles,
+)
+from solver.scene import Scene
+
+if TYPE_CHECKING:
+    from mpi4py.MPI import Intracomm
+    from rich.console import Console
+    from rich.table import Table
+
+    from ensemble.display.progress import Display
+    from ensemble.mpi.run_study import Snapshot, StudyResult
+    from ensemble.search.boundary import Boundary
+    from ensemble.store import Store
+
+_ENDS = 2  # of a bracket, hence limits that are run first, and runs that certify a bracket
+
+
+class StudyQuestion(Question[Study]):
+    """See `Question`.
+
+    Parameters
+    ----------
+    document : Study
+        What is asked.
+    name : str
+        The name of the study.
+    """
+
+    kind = "study"
+    document_type = Study
+    marker = "search"
+    command = "bisect"
+    title = "Trace a boundary"
+    collection = "boundaries"
+    answer_title = "diagram"
+    answer_grows = True
+    principal_fields = ("sweep.values", "search.limits", "search.tolerance", "search.certify")
+
+    @classmethod
+    def check_size(cls, document: Any) -> None:
+        """See `Question`.
+
+        Parameters
+        ----------
+        document : object
+            What was sent.
+        """
+        limit_vesicles(document, MOST_VESICLES_SWEPT, "scene")
+        limit_elements(document, MOST_SWEEP_VALUES, "sweep", "values")
+
+    @property
+    def key(self) -> str:
+        """See `Question`."""
+        return self.document.key
+
+    @property
+    def scene(self) -> Scene:
+        """See `Question`."""
+        return self.document.scene
+
+    def planned_runs(self) -> Iterator[tuple[Scene, int]]:
+        """See `Question`.  A search runs both limits and then halves the distance between them."""
+        study = self.document
+        candidates = len(study.search.grid.within(*study.search.limits))
+        searching = math.ceil(math.log2(candidates)) + _ENDS
+        for sweep_value in study.sweep.values:
+            scenes = [study.scene_at(sweep_value, limit) for limit in study.search.limits]
+            costliest = max(scenes, key=run_work)
+            yield from ((scene, searching if scene is costliest else 0) for scene in scenes)
+            if study.search.certify:
+                yield certifying_scene(costliest), _ENDS
+
+    def answer(
+        self,
+        communicator: Intracomm | None,
+        store: Path | None,
+        ranks_per_run: int,
+        on_change: Callable[[Snapshot], None],
+    ) -> Answer:
+        """See `Question`.
+
+        Parameters
+        ----------
+        communicator : Intracomm
+            All ranks.
+        store : Path
+            Keeps the runs and the boundary.
+        ranks_per_run : int
+            How many ranks compute a run together.
+        on_change : callable
+            Takes snapshots of the boundary.
+
+        Returns
+        -------
+        Answer
+            On every rank.
+        """
+        from ensemble.mpi.run_study import run_study
+        from ensemble.mpi.store_on_ranks import store_on_ranks
+
+        assert communicator is not None, "many runs need a communicator"
+        assert store is not None, "and a store"
+        with store_on_ranks(communicator, store) as opened:
+            result = run_study(communicator, self.document, opened, on_change, ranks_per_run)
+        return _TracedBoundary(result, store)
+
+    @classmethod
+    def progress(cls, console: Console, for_program: bool) -> Display:
+        """See `Question`.
+
+        Parameters
+        ----------
+        console : Console
+            Where it is shown.
+        for_program : bool
+            Whether it is read by a program.
+
+        Returns
+        -------
+        context manager
+            Gives a function that takes a `Snapshot`.
+        """
+        from ensemble.display.progress import study_lines, study_progress
+
+        return study_lines(console) if for_program else study_progress(console)
+
+    @classmethod
+    def summary(cls, json_document: Mapping[str, Any]) -> str:
+        """See `Question`.
+
+        Parameters
+        ----------
+        json_document : mapping
+            As `ensemble bisect --json` prints it.
+
+        Returns
+        -------
+        str
+            How many points have converged, and what became of each of the others.
+        """
+        points = json_document["boundary"]
+        others = [point for point in points if point["status"] != "converged"]
+        return f"{len(points) - len(others)} of {len(points)} points converged" + "".join(
+            f"; {name} {value:g}: {point['status']}"
+            for point in others
+            for name, value in point["parameters"].items()
+        )
+
+    @classmethod
+    def stored(cls, store: Store, name: str) -> StoredAnswer | None:
+        """See `Question`.
+
+        Parameters
+        ----------
+        store : Store
+            An open store.
+        name : str
+            Key of the study, or its name; of several boundaries of this name the one that changed last.
+
+        Returns
+        -------
+        StoredAnswer or None
+            The boundary.
+        """
+        named = [boundary for boundary in store.boundaries() if name in (boundary.study_key, boundary.name)]
+        return _StoredBoundary(named[-1], store) if named else None
+
+    @classmethod
+    def all_stored(cls, store: Store, where: Sequence[str]) -> StoredAnswers:
+        """See `Question`.
+
+        Parameters
+        ----------
+        store : Store
+            An open store.
+        where : sequence of str
+            Conditions, such as ``name=critical-hamaker``.
+
+        Returns
+        -------
+        StoredAnswers
+            The boundaries.
+        """
+        from ensemble.display.result_tables import boundaries_table
+
+        boundaries = store.boundaries(where)
+        documents = [boundary.model_dump(mode="json") for boundary in boundaries]
+        return StoredAnswers(documents, boundaries_table(boundaries))
+
+
+@dataclass(frozen=True)
+class _TracedBoundary(Answer):
+    """A boundary and what it took to trace it."""
+
+    result: StudyResult
+    store: Path
+
+    @property
+    def complete(self) -> bool:
+        from ensemble.search.critical_value import SearchStatus
+
+        return all(point.status == SearchStatus.CONVERGED for point in self.result.boundary.points)
+
+    def json_document(self) -> dict[str, Any]:
+        """Return the boundary and its cost; `busy_fraction` is None if nothing had to be run."""
+        boundary, usage = self.result.boundary, self.result.usage
+        return {
+            "study": boundary.name,
+            "boundary": [point.model_dump(mode="json") for point in boundary.points],
+            "wall_seconds": usage.wall_seconds,
+            "busy_fraction": fmean(usage.busy_fractions) if usage.busy_fractions else None,
+            "store": str(self.store),
+        }
+
+    def table(self) -> Table:
+        from ensemble.display.result_tables import boundary_table
+
+        return boundary_table(self.result.boundary)
+
+    @property
+    def footer(self) -> str:
+        usage = self.result.usage
+        runs = f"{usage.runs} runs in {usage.wall_seconds:.1f} s"
+        if not usage.busy_fractions:
+            return runs
+        mean, least = fmean(usage.busy_fractions), min(usage.busy_fractions)
+        return f"{runs}; ranks busy {mean:.1%} of the time on average, {least:.1%} at least"
+
+
+@dataclass(frozen=True)
+class _StoredBoundary(StoredAnswer):
+    """A boundary of a store, as far as it is known."""
+
+    boundary: Boundary
+    store: Store
+
+    def table(self) -> Table:
+        from ensemble.display.result_tables import boundary_table
+
+        return boundary_table(self.boundary)
+
+    def draw(self, output: Path) -> None:
+        """Draw the phase diagram, with every run that is behind the boundary."""
+        from ensemble.config.dotted_paths import parameter_value
+        from ensemble.figures import phase_diagram, save
+        from ensemble.figures.movie import MOVIE_SUFFIXES
+
+        if output.suffix.lower() in MOVIE_SUFFIXES:
+            raise ValueError(
+                f"output: only a run can be a movie, {self.boundary.name} is a boundary, got {output.name!r}"
+            )
+        searched = self.boundary.study["search"]["parameter"]
+        runs = []
+        for point in self.boundary.points:
+            (at,) = point.parameters.values()
+            for key in point.runs:
+                summary = self.store.summary(key)
+                runs.append((at, parameter_value(summary.scene, searched), summary.outcome))
+        save(phase_diagram(self.boundary, runs), output)
