@@ -17,11 +17,11 @@ several strings, instead of a ``Literal``.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, TypeGuard, TypeVar
 
-from pydantic import BaseModel, GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic import BaseModel, GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
 from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema, PydanticKnownError, core_schema
+from pydantic_core import CoreSchema, PydanticKnownError, core_schema, to_json
 
 M = TypeVar("M", bound=BaseModel)
 
@@ -74,9 +74,23 @@ class Registry(Generic[M]):
 
     def _validate(self, value: Any) -> M:
         """Make a model from a document; an instance of a registered model stays as it is."""
-        for model in self._models.values():
-            if isinstance(value, model):
-                return value
+        # Pydantic merges the errors of the model into those of the document around it.
+        return value if self._holds(value) else self._model_for(value).model_validate(value)
+
+    def _validate_strictly(self, value: Any, info: ValidationInfo) -> M:
+        """Do as `_validate`, with no conversion between types but those from JSON."""
+        if self._holds(value):
+            return value
+        model = self._model_for(value)
+        if info.mode == "json":
+            return model.model_validate_json(to_json(value, inf_nan_mode="constants"), strict=True)
+        return model.model_validate(value, strict=True)
+
+    def _holds(self, value: Any) -> TypeGuard[M]:
+        return isinstance(value, tuple(self._models.values()))
+
+    def _model_for(self, value: Any) -> type[M]:
+        """Return the model of the kind that a document names."""
         if not isinstance(value, Mapping):
             raise PydanticKnownError("dict_type")
         if _DISCRIMINATOR not in value and self._default is None:
@@ -90,12 +104,14 @@ class Registry(Generic[M]):
                 "expected_tags": ", ".join(map(repr, self._models)),
             }
             raise PydanticKnownError("union_tag_invalid", context)
-        # Pydantic merges the errors of this model into those of the document around it.
-        return self._models[kind].model_validate(value)
+        return self._models[kind]
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         """Validate by looking the kind up; serialize as the model that a value is."""
-        return core_schema.no_info_plain_validator_function(self._validate)
+        return core_schema.lax_or_strict_schema(
+            core_schema.no_info_plain_validator_function(self._validate),
+            core_schema.with_info_plain_validator_function(self._validate_strictly),
+        )
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler

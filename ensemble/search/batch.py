@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable
 
 from ensemble.config.run_key import run_key
 from ensemble.search.task_queue import Task
-from solver.analysis.outcome import latest_time
 from solver.analysis.run import Outcome
 from solver.scene import Scene
 
@@ -97,4 +96,4 @@ def expected_work(scene: Scene) -> float:
     """
     points = _AUTOMATIC_POINTS if scene.numerics.points == "auto" else scene.numerics.points
     relaxation = scene.start.horizon if scene.start.relaxed else 0.0
-    return (relaxation + latest_time(scene)) * (len(scene.vesicles) * points) ** 2
+    return (relaxation + scene.latest_time) * (len(scene.vesicles) * points) ** 2

@@ -12,6 +12,7 @@ from scipy.optimize import brentq
 from solver.integrators import Step
 from solver.membrane import curve
 from solver.membrane.geometry import Membranes
+from solver.scene import Scene
 
 Array = NDArray[np.float64]
 
@@ -101,6 +102,17 @@ class LongAxisTracker(RevolutionTracker):
         membranes = self.membranes
         angle, center = membranes.tangent_angle(state), membranes.center(state)
         return float(curve.inclination(curve.positions(angle, center, membranes.length))[0])
+
+
+def may_tumble(scene: Scene) -> bool:
+    """Return whether a scene is a single vesicle with a long axis, in a flow that rotates it.
+
+    Parameters
+    ----------
+    scene : Scene
+    """
+    rotates = scene.flow is not None and scene.flow.rotates
+    return len(scene.vesicles) == 1 and rotates and scene.vesicles[0].reduced_area < 1
 
 
 def crossing(step: Step, excess: Callable[[Array], float]) -> float:

@@ -69,8 +69,10 @@ class Scene(Model):
         return tuple(arrangement.vesicles())
 
     @model_validator(mode="after")
-    def _arranged(self) -> Self:
-        self.__dict__["arrangement"] = None  # scenes of equal vesicles are equal
+    def _drop_arrangement(self) -> Self:
+        # Scenes of equal vesicles are equal, however these were arranged.  As in `__post_init__` of a frozen
+        # dataclass: a validator before the fields would see parsed JSON, which is not strict about types.
+        object.__setattr__(self, "arrangement", None)
         return self
 
     @model_validator(mode="after")
@@ -94,6 +96,12 @@ class Scene(Model):
     def many(self) -> bool:
         """Whether sums are used instead of matrices over all points; they support no viscosity contrast."""
         return len(self.vesicles) > LARGEST_DENSE and all(v.viscosity_contrast == 1 for v in self.vesicles)
+
+    @property
+    def latest_time(self) -> float:
+        """When a run ends at the latest; an undecided pair may run on beyond the horizon."""
+        extended = len(self.vesicles) == 2 and self.flow is not None and self.flow.extends_pairs
+        return self.horizon * (self.criteria.extensions if extended else 1.0)
 
     @model_validator(mode="after")
     def _options_of_many(self) -> Self:

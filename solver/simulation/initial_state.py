@@ -14,7 +14,17 @@ Array = NDArray[np.float64]
 
 
 def initial_ellipses(scene: Scene) -> Array:
-    """Ellipses where the scene places them."""
+    """Return the state of ellipses where the scene places its vesicles.
+
+    Parameters
+    ----------
+    scene : Scene
+        With a number of points.
+
+    Returns
+    -------
+    (state_size,)
+    """
     vesicles, membranes = independent_vesicles(scene), Membranes.of_scene(scene)
     tangent_angle = [
         of_reduced_area(
@@ -28,10 +38,22 @@ def initial_ellipses(scene: Scene) -> Array:
 
 
 def rotated_state(membranes: Membranes, state: Array, tilt: float) -> Array:
-    """Two vesicles about the origin with their line of centers along y, plus ``tilt`` radians."""
+    """Rotate two vesicles, and move the middle of their centers to the origin.
+
+    Parameters
+    ----------
+    membranes : Membranes
+    state : (state_size,)
+    tilt : float
+        Angle of the line of centers against y afterwards, radians.
+
+    Returns
+    -------
+    (state_size,)
+    """
     tangent_angle, center = membranes.tangent_angle(state), membranes.center(state)
     first, second = membranes.curve_center(state)
     offset = second - first
-    turn = np.pi / 2 + tilt - np.arctan2(offset[1], offset[0])
-    rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
-    return membranes.pack(tangent_angle + turn, (center - 0.5 * (first + second)) @ rotation.T)
+    angle = np.pi / 2 + tilt - np.arctan2(offset[1], offset[0])
+    rotation = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    return membranes.pack(tangent_angle + angle, (center - 0.5 * (first + second)) @ rotation.T)

@@ -1,8 +1,9 @@
-"""How many points a membrane needs, and how a state is carried to more of them.
+"""How many points each membrane has.
 
 With ``points = "auto"`` a run begins with the fewest points on `LADDER` that resolve its start, and climbs
-the ladder when a state comes out that they do not resolve.  A state is resolved if its estimated error in
-space (`spatial_error`) is within the tolerance and its membranes are far enough apart for adhesion's sum.
+the ladder when a step ends in a state that they do not resolve.  A state is resolved if its estimated error
+in space (`solver.analysis.spatial_error`) is within the tolerance and its membranes are far enough apart for
+the sum over adhesion.
 """
 
 from __future__ import annotations
@@ -12,9 +13,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.analysis.spatial_error import shape_tails, spatial_error
 from solver.forces.adhesion import Adhesion
 from solver.membrane.geometry import Geometry, Membranes
-from solver.membrane.spectral import resampled, tail
 from solver.membrane.symmetry import independent_vesicles
 from solver.motion.equation import accuracy_of
 from solver.potentials.neighbors import Neighbors
@@ -27,53 +28,111 @@ Array = NDArray[np.float64]
 
 LADDER = (32, 48, 64, 96, 128, 192, 256, 384, 512, 768, 1024)
 
-# Of `spatial_error`, measured: position errors of runs converged in time, against the tails of their spectra,
-# lie at or below 250·tail³ where the start's tail is the largest and below 60·tail^1.5 where one persists.
-_STARTING, _PERSISTING = 300.0, 100.0
-
 
 class UnresolvedError(ArithmeticError):
     """No number of points on the ladder resolves a state; the message says why."""
 
 
 class Resolution(Protocol):
-    """Chooses the number of points."""
+    """Chooses the number of points.
 
-    points: int  # to begin with
+    Attributes
+    ----------
+    points : int
+        On each vesicle at the start.
+    """
+
+    points: int
 
     def finer(self, membranes: Membranes, time: float, state: Array) -> int | None:
-        """The number of points to compute a state anew with; None if these do.
+        """Return the number of points with which a step is taken again.
+
+        Parameters
+        ----------
+        membranes : Membranes
+        time : float
+            At the end of the step.
+        state : (state_size,)
+            At that time.
+
+        Returns
+        -------
+        int or None
+            None if the present number resolves the state.
 
         Raises
         ------
         UnresolvedError
-            If none does.
+            If no number does.
         """
 
 
 def resolution_of(scene: Scene) -> Resolution:
-    """The resolution that a scene asks for."""
+    """Return the resolution that a scene asks for.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Returns
+    -------
+    Resolution
+    """
     points = scene.numerics.points
     return AdaptiveResolution(scene) if points == "auto" else FixedResolution(points)
 
 
 def with_points(scene: Scene, points: int) -> Scene:
-    """The scene with this number of points."""
+    """Return a scene with another number of points.
+
+    Parameters
+    ----------
+    scene : Scene
+    points : int
+        On each vesicle.
+
+    Returns
+    -------
+    Scene
+    """
     return scene.model_copy(update={"numerics": scene.numerics.model_copy(update={"points": points})})
 
 
 class FixedResolution:
-    """The same number of points whatever happens."""
+    """The same number of points whatever happens.
+
+    Parameters
+    ----------
+    points : int
+        On each vesicle.
+    """
 
     def __init__(self, points: int) -> None:
         self.points = points
 
     def finer(self, membranes: Membranes, time: float, state: Array) -> None:
-        """See `Resolution`."""
+        """Return None, always.
+
+        Parameters
+        ----------
+        membranes : Membranes
+        time : float
+        state : (state_size,)
+        """
 
 
 class AdaptiveResolution:
-    """As many points as the tolerance needs."""
+    """As many points as the tolerance needs.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Attributes
+    ----------
+    points : int
+        On each vesicle at the start.
+    """
 
     def __init__(self, scene: Scene) -> None:
         numerics = scene.numerics
@@ -81,14 +140,30 @@ class AdaptiveResolution:
         self._rate = _rates(scene)
         adhesion = scene.adhesion if len(scene.vesicles) > 1 else None
         self._least_distance = 0.0  # between membranes, over the spacing
-        self._closest = np.inf  # where adhesion draws the membranes to
+        self._closest = np.inf  # distance to which adhesion draws the membranes
         if adhesion:
             self._least_distance = Adhesion(adhesion, accuracy_of(numerics)).ratio / MAXIMUM_FACTOR
             self._closest = adhesion.distance
         self.points = self._first(scene)
 
     def finer(self, membranes: Membranes, time: float, state: Array) -> int | None:
-        """See `Resolution`."""
+        """Return the next number of points on the ladder if the present one does not resolve a state.
+
+        Parameters
+        ----------
+        membranes : Membranes
+        time : float
+        state : (state_size,)
+
+        Returns
+        -------
+        int or None
+
+        Raises
+        ------
+        UnresolvedError
+            If the membranes are too close for the largest number.
+        """
         geometry = Geometry(membranes, state)
         apart = self._apart(geometry)
         if apart and self._smooth(geometry, time, state):
@@ -105,8 +180,8 @@ class AdaptiveResolution:
             placed = with_points(scene, points)
             membranes, state = Membranes.of_scene(placed), initial_ellipses(placed)
             geometry = Geometry(membranes, state)
-            drawn_together = self._closest >= self._least_distance * membranes.spacing.max()
-            if drawn_together and self._apart(geometry) and self._smooth(geometry, 0.0, state):
+            resolves_contact = self._closest >= self._least_distance * membranes.spacing.max()
+            if resolves_contact and self._apart(geometry) and self._smooth(geometry, 0.0, state):
                 return points
         return LADDER[-1]
 
@@ -124,44 +199,8 @@ class AdaptiveResolution:
 
 
 def _rates(scene: Scene) -> Array:
-    """How fast bending, adhesion and flow change the shapes of the vesicles that are computed, (M,)."""
+    """Return how fast bending, adhesion and flow change the shape of each independent vesicle, (M,)."""
     bending = np.array([v.bending_modulus * (2 * np.pi / v.length) ** 3 for v in independent_vesicles(scene)])
     adhesion = scene.adhesion.hamaker if scene.adhesion else 0.0
     flow = scene.flow.rate if scene.flow else 0.0
     return bending + adhesion + flow
-
-
-def shape_tails(membranes: Membranes, state: Array) -> Array:
-    """The `spectral.tail` of each vesicle's tangent angle, (M,)."""
-    turned = 2 * np.pi * np.arange(membranes.points) / membranes.points
-    return tail(membranes.tangent_angle(state) - turned)
-
-
-def spatial_error(tails: Array, age: Array) -> Array:
-    """Estimate the errors of positions that tails (M,) of spectra stand for.
-
-    Bending smooths the tips of a slender ellipse within a moment, so that the error they leave is little more
-    than that of their sampling.  A tail that forces renew does harm for as long as they act.
-
-    Parameters
-    ----------
-    tails : (M,)
-    age : (M,)
-        Time since the start, in units of that in which forces change the shapes.
-    """
-    return np.asarray(_STARTING * tails**3 + _PERSISTING * tails**1.5 * np.minimum(age, 1.0))
-
-
-def resampled_angle(tangent_angle: Array, points: int) -> Array:
-    """Tangent angles (..., N) at ``points`` ≥ N points, (..., points): the same curves."""
-    given = tangent_angle.shape[-1]
-    if points == given:
-        return tangent_angle
-    coarse, fine = (2 * np.pi * np.arange(n) / n for n in (given, points))
-    return resampled(tangent_angle - coarse, points) + fine
-
-
-def carried(membranes: Membranes, state: Array, finer: Membranes) -> Array:
-    """A state of membranes as a state of the same ones with more points."""
-    angle = resampled_angle(membranes.tangent_angle(state), finer.points)
-    return finer.pack(angle, membranes.center(state))

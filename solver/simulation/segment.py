@@ -19,7 +19,13 @@ Array = NDArray[np.float64]
 class SegmentWork(NamedTuple):
     """What a run has cost so far.
 
-    ``evaluations`` are those for steps; ``recordings`` those for diagnostics and frames alone.
+    Attributes
+    ----------
+    evaluations : int
+        Of the equation of motion, for steps.
+    recordings : int
+        Of the equation of motion, for diagnostics and frames alone.
+    jacobians, factorizations, tension_iterations : int
     """
 
     evaluations: int = 0
@@ -35,42 +41,65 @@ class Segment:
     Parameters
     ----------
     scene : Scene
-        With that number.
-    before : Cost
+        With that number of points.
+    before : SegmentWork
         Of the parts before this one.
     parallel : Parallel
         The ranks that compute it together.
+
+    Attributes
+    ----------
+    equation : EquationOfMotion
     """
 
     def __init__(self, scene: Scene, before: SegmentWork, parallel: Parallel) -> None:
-        self.dynamics = equation_of_motion(scene, parallel)
+        self.equation = equation_of_motion(scene, parallel)
         self._scene = scene
         self._before = before
         self._integrator: Integrator | None = None
 
     @property
     def membranes(self) -> Membranes:
-        """What stays the same while this part lasts."""
-        return self.dynamics.membranes
+        """What stays the same in this part."""
+        return self.equation.membranes
 
     def begin(self, time: float, state: Array, latest: float) -> None:
-        """Make the integrator that goes on from this state, until ``latest`` at most."""
-        problem = InitialValueProblem(self.dynamics, state, time, latest)
+        """Make the integrator for the steps from a state on.
+
+        Parameters
+        ----------
+        time : float
+        state : (state_size,)
+            At this time.
+        latest : float
+            When the last step ends.
+        """
+        problem = InitialValueProblem(self.equation, state, time, latest)
         self._integrator = integrator_for(problem, self._scene.numerics, len(self._scene.vesicles))
 
     def step(self) -> Step:
-        """Take one step."""
+        """Take one step; `begin` comes before.
+
+        Returns
+        -------
+        Step
+
+        Raises
+        ------
+        StepFailedError
+            If no step is possible.
+        """
         assert self._integrator
         return self._integrator.step()
 
     @property
-    def cost(self) -> SegmentWork:
-        """What the run has cost up to now."""
+    def work(self) -> SegmentWork:
+        """What the run has cost up to now, the parts before this one included."""
         integrator = self._integrator
         return SegmentWork(
-            self._before.evaluations + self.dynamics.evaluations,
-            self._before.recordings + self.dynamics.recordings,
+            self._before.evaluations + self.equation.evaluations,
+            self._before.recordings + self.equation.recordings,
             self._before.jacobians + (integrator.jacobian_evaluations if integrator else 0),
             self._before.factorizations + (integrator.factorizations if integrator else 0),
-            self._before.tension_iterations + self.dynamics.tension_iterations,
+            self._before.tension_iterations + self.equation.tension_iterations,
         )

@@ -22,6 +22,7 @@ class Circle(Model):
 class Square(Model):
     kind: Literal["square"] = "square"
     side: Positive
+    corners: tuple[float, float] | None = None
 
 
 class Dot(Model):
@@ -55,7 +56,7 @@ def test_a_document_becomes_the_model_of_its_kind(read: Any) -> None:
     figure = read({"shape": {"kind": "square", "side": 2}, "other": {"kind": "circle", "radius": 1}})
     assert figure == Figure(shape=Square(side=2.0), other=Circle(radius=1.0))
     assert figure.model_dump() == {
-        "shape": {"kind": "square", "side": 2.0},
+        "shape": {"kind": "square", "side": 2.0, "corners": None},
         "other": {"kind": "circle", "radius": 1.0},
     }
     assert Figure.model_validate_json(figure.model_dump_json()) == figure
@@ -85,6 +86,20 @@ def test_a_refusal_names_the_field_and_what_is_allowed(
         Figure.model_validate({"shape": {"radius": 1.0}, "other": other})
     (error,) = refused.value.errors()
     assert error["loc"] == ("other", *location)
+
+
+def test_strict_validation_of_json_converts_nothing() -> None:
+    def read(document: str) -> Figure:
+        return Figure.model_validate_json(document, strict=True)
+
+    square = Square(side=2, corners=(1.0, 2.0))
+    assert read('{"shape": {"kind": "square", "side": 2, "corners": [1, 2]}}') == Figure(shape=square)
+    with pytest.raises(ValidationError, match=r"(?s)shape\.side.*valid number"):
+        read('{"shape": {"kind": "square", "side": "2"}}')
+    with pytest.raises(ValidationError, match=r"(?s)shape\.side.*valid number"):
+        Figure.model_validate({"shape": {"kind": "square", "side": "2"}}, strict=True)
+    with pytest.raises(ValidationError, match=r"(?s)shape\.side.*finite number"):
+        read('{"shape": {"kind": "square", "side": NaN}}')
 
 
 @pytest.mark.usefixtures("dots")

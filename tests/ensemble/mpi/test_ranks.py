@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from solver.analysis.outcome import Outcome
+from solver.analysis.run import Outcome
 from solver.parallel import SERIAL
 from solver.simulation.simulate import simulate
 from tests.ensemble.mpi.rank_comparison import DOUBLET, computed

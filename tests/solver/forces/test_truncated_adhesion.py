@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from solver.analysis.outcome import Outcome
+from solver.analysis.run import Outcome
 from solver.forces.adhesion import Adhesion
 from solver.forces.truncated_adhesion import TruncatedAdhesion
 from solver.forces.truncated_power_law import TruncatedPotential, truncated_potential

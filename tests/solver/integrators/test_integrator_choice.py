@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from solver.analysis.outcome import Outcome
+from solver.analysis.run import Outcome
 from solver.integrators import InitialValueProblem, integrator_for
 from solver.integrators.bdf import BackwardDifferentiation
 from solver.integrators.control import root_mean_square

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from solver.analysis.outcome import Outcome
+from solver.analysis.run import Outcome
 from solver.motion.dense import DenseEquation
 from solver.scene import Criteria, Extension, Flow, Numerics, Scene, Shear, Trap, Vesicle
 from solver.simulation.initial_state import initial_ellipses

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import root
 
-from solver.analysis.outcome import Outcome
+from solver.analysis.run import Outcome
 from solver.integrators import InitialValueProblem, integrator_for
 from solver.membrane.shapes import ellipse_tangent_angle, of_reduced_area
 from solver.motion.dense import DenseEquation

@@ -14,19 +14,17 @@ from numpy.typing import NDArray
 from solver import Outcome, Run, Scene
 from solver.analysis.run import Frames
 from solver.membrane.curve import positions
-from solver.membrane.geometry import Geometry, Membranes
+from solver.membrane.geometry import Membranes
 from solver.motion.dense import DenseEquation
 from solver.parallel import Parallel
 from solver.scene import Adhesion, Criteria, Numerics, Output, Shear, Start, Trap, Vesicle
-from solver.simulation import simulate as time_loop
+from solver.simulation import simulate as simulate_module
 from solver.simulation.initial_state import initial_ellipses
 from solver.simulation.resolution import (
     LADDER,
     AdaptiveResolution,
     FixedResolution,
     UnresolvedError,
-    carried,
-    resampled_angle,
     resolution_of,
     with_points,
 )
@@ -97,7 +95,7 @@ class Scripted:
 
 def scripted(monkeypatch: pytest.MonkeyPatch, points: int, raises: Mapping[float, int]) -> Scripted:
     script = Scripted(points, raises)
-    monkeypatch.setattr(time_loop, "resolution_of", lambda scene: script)
+    monkeypatch.setattr(simulate_module, "resolution_of", lambda scene: script)
     return script
 
 
@@ -206,42 +204,6 @@ def test_membranes_need_a_number_of_points() -> None:
         DenseEquation.of(adaptive(alone(0.9)))
 
 
-# Carrying a state.
-
-
-@pytest.mark.parametrize(("points", "finer"), [(32, 48), (48, 64), (64, 96), (64, 256)])
-def test_a_band_limited_state_is_carried_exactly(points: int, finer: int) -> None:
-    random = np.random.default_rng(points)
-    degree = points // 2 - 1
-    amplitudes = random.standard_normal((2, 2, degree)) / np.arange(1, degree + 1) ** 2
-
-    def state(count: int) -> tuple[Membranes, Array]:
-        membranes = Membranes.of((Vesicle(), Vesicle(length=4.0, center=(3.0, 1.0))), count)
-        alpha = 2 * np.pi * np.arange(count) / count
-        waves = np.stack([np.cos(np.outer(np.arange(1, degree + 1), alpha) + phase) for phase in (0.0, 1.0)])
-        angle = 3.0 + alpha + np.einsum("vpk,pkn->vn", amplitudes, waves)
-        return membranes, membranes.pack(angle, np.array([[0.0, 0.2], [3.0, 1.0]]))
-
-    (coarse, given), (fine, expected) = state(points), state(finer)
-    np.testing.assert_allclose(carried(coarse, given, fine), expected, rtol=0, atol=1e-13)
-    np.testing.assert_array_equal(carried(coarse, given, coarse), given)
-
-
-def test_the_highest_mode_is_carried_as_the_wave_it_is() -> None:
-    """On 16 points cos 8α has no sine beside it; on more it is still that cosine, and of that amplitude."""
-    alpha, finer = (2 * np.pi * np.arange(n) / n for n in (16, 24))
-    angle = resampled_angle(alpha + 0.1 * np.cos(8 * alpha), 24)
-    np.testing.assert_allclose(angle, finer + 0.1 * np.cos(8 * finer), rtol=0, atol=1e-14)
-
-
-def test_a_carried_start_is_the_same_curve() -> None:
-    scene = uneven_pair()
-    coarse, fine = (Membranes.of_scene(with_points(scene, n)) for n in (192, 384))
-    state = initial_ellipses(with_points(scene, 192))
-    finer = Geometry(fine, carried(coarse, state, fine))
-    np.testing.assert_allclose(finer.points[:, :, ::2], Geometry(coarse, state).points, rtol=0, atol=1e-13)
-
-
 # Whole runs.
 
 
@@ -320,7 +282,7 @@ def test_what_no_number_resolves_fails_with_the_reason(monkeypatch: pytest.Monke
                 raise UnresolvedError("too close")
             return None
 
-    monkeypatch.setattr(time_loop, "resolution_of", lambda scene: Refusing(32, {}))
+    monkeypatch.setattr(simulate_module, "resolution_of", lambda scene: Refusing(32, {}))
     run = simulate(fixed(shear_pair(1.5), 32))
     assert run.outcome is Outcome.FAILED
     assert run.failure == "too close (32 points do not resolve the scene: spatial error 3.2e-03)"

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solver.analysis.outcome import Outcome
-from solver.analysis.run import Run
+from solver.analysis.run import Outcome, Run
 from solver.membrane.geometry import Geometry, Membranes
 from solver.potentials.proximity import Closeness
 from solver.scene import Adhesion, Numerics, Scene, Vesicle

@@ -1,0 +1,79 @@
+"""What an outcome criterion is given, and what it does."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.analysis.line_of_centers import LineOfCenters
+from solver.analysis.revolutions import LongAxisTracker
+from solver.analysis.run import Outcome
+from solver.membrane.geometry import Membranes
+from solver.scene import Scene
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class History:
+    """The run up to the end of its last step.
+
+    Parameters
+    ----------
+    time : float
+        End of the last step.
+    state : (state_size,)
+        At that time.
+    membranes : Membranes
+        Those of the state.
+    samples : mapping from name to sequence of float
+        The recorded diagnostics, ``time`` among them; `solver.analysis.run.Series` names them.
+    line_of_centers : LineOfCenters or None
+        Of two vesicles.
+    long_axis : LongAxisTracker or None
+        Of a single vesicle that may tumble.
+    """
+
+    time: float
+    state: Array
+    membranes: Membranes
+    samples: Mapping[str, Sequence[float]]
+    line_of_centers: LineOfCenters | None
+    long_axis: LongAxisTracker | None
+
+
+class Criterion(ABC):
+    """Decides runs of the scenes that it applies to.
+
+    Parameters
+    ----------
+    scene : Scene
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+
+    @classmethod
+    @abstractmethod
+    def applies_to(cls, scene: Scene) -> bool:
+        """Return whether the criterion can decide runs of a scene.
+
+        Parameters
+        ----------
+        scene : Scene
+        """
+
+    @abstractmethod
+    def decide(self, history: History) -> Outcome | None:
+        """Return what the run has become, None while that is open.
+
+        It is called after every step.
+
+        Parameters
+        ----------
+        history : History
+        """

@@ -1,0 +1,31 @@
+"""A pair has come apart."""
+
+from __future__ import annotations
+
+from solver.analysis.criteria.base import Criterion, History
+from solver.analysis.run import Outcome
+from solver.scene import Scene
+
+
+class Separated(Criterion):
+    """The centers of a pair have passed ``separated_distance``, moving apart."""
+
+    @classmethod
+    def applies_to(cls, scene: Scene) -> bool:
+        """Return whether the scene is a pair.
+
+        Parameters
+        ----------
+        scene : Scene
+        """
+        return len(scene.vesicles) == 2
+
+    def decide(self, history: History) -> Outcome | None:
+        """Return `Outcome.SEPARATED` once the line of centers has passed the distance.
+
+        Parameters
+        ----------
+        history : History
+        """
+        assert history.line_of_centers
+        return Outcome.SEPARATED if history.line_of_centers.separated else None

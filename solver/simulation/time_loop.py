@@ -1,0 +1,154 @@
+"""The time loop: one step after the other, until the outcome is decided."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.analysis.criteria import History, criteria_for
+from solver.analysis.line_of_centers import LineOfCenters
+from solver.analysis.recorder import Recorder
+from solver.analysis.revolutions import LongAxisTracker, RevolutionTracker, may_tumble
+from solver.analysis.run import Outcome
+from solver.integrators import Step, StepFailedError
+from solver.membrane.resampling import resampled_state
+from solver.parallel import Parallel, require_agreement
+from solver.scene import Scene
+from solver.simulation.resolution import Resolution, with_points
+from solver.simulation.segment import Segment, SegmentWork
+
+Array = NDArray[np.float64]
+
+
+class TimeLoop:
+    """Advances a scene step by step.
+
+    Parameters
+    ----------
+    scene : Scene
+    points : int
+        On each vesicle at the start.
+    state : (state_size,)
+        At time 0, with these points.
+    resolution : Resolution
+        Asks for more points.
+    parallel : Parallel
+        The ranks that compute the run together.
+
+    Attributes
+    ----------
+    time : float
+    state : (state_size,)
+        At this time.
+    outcome : Outcome
+        `UNDECIDED` as long as the run goes on.
+    segment : Segment
+        The part of the run that has the present number of points.
+    tracker : RevolutionTracker or None
+        Of the line of centers of a pair, or of the long axis of a single vesicle that may tumble.
+    recorder : Recorder
+    steps, rejected_steps : int
+    smallest_step : float or None
+        Of the accepted steps; None before the first one.
+    temporal_error : float
+        Sum of the estimated local errors.
+    """
+
+    def __init__(
+        self, scene: Scene, points: int, state: Array, resolution: Resolution, parallel: Parallel
+    ) -> None:
+        self._scene = scene
+        self._resolution = resolution
+        self._parallel = parallel
+        self._criteria = criteria_for(scene)
+        self.time = 0.0
+        self.state = state
+        self.outcome = Outcome.UNDECIDED
+        self.segment = Segment(with_points(scene, points), SegmentWork(), parallel)
+        membranes = self.segment.membranes
+        self._line_of_centers = (
+            LineOfCenters(membranes, state, scene.criteria.separated_distance)
+            if len(scene.vesicles) == 2
+            else None
+        )
+        self._long_axis = LongAxisTracker(membranes, state) if may_tumble(scene) else None
+        self.tracker: RevolutionTracker | None = self._line_of_centers or self._long_axis
+        self.recorder = Recorder(scene, self.segment.equation, self._line_of_centers)
+        self.steps = self.rejected_steps = 0
+        self.smallest_step: float | None = None
+        self.temporal_error = 0.0
+
+    @property
+    def done(self) -> bool:
+        """Whether the run is decided or has come to its latest time."""
+        return self.time >= self._scene.latest_time or self.outcome is not Outcome.UNDECIDED
+
+    def begin(self) -> None:
+        """Prepare the first step."""
+        self.segment.begin(self.time, self.state, self._scene.latest_time)
+
+    def advance(self) -> bool:
+        """Take one step.
+
+        Returns
+        -------
+        bool
+            Whether the step was accepted; if not, the next one is taken with more points.
+
+        Raises
+        ------
+        StepFailedError
+            If no step is possible, or the work limit of the scene is reached.
+        UnresolvedError
+            If no number of points resolves the state.
+        TensionNotFoundError
+            If the membranes are too distorted.
+        """
+        step = self.segment.step()
+        require_agreement(self._parallel, step.end)
+        points = self._resolution.finer(self.segment.membranes, step.end, step.state)
+        if points is not None:
+            self._refine(points)
+            return False
+        self._accept(step)
+        limit = self._scene.numerics.work_limit
+        if self.segment.work.evaluations > limit:
+            raise StepFailedError(f"the work limit of {limit} evaluations is reached")
+        return True
+
+    def _refine(self, points: int) -> None:
+        """Go on from the start of the step with more points."""
+        coarse = self.segment.membranes
+        self.segment = Segment(with_points(self._scene, points), self.segment.work, self._parallel)
+        self.state = resampled_state(coarse, self.state, self.segment.membranes)
+        self.rejected_steps += 1
+        self.recorder.continue_with(self.segment.equation)
+        if self.tracker:
+            self.tracker.membranes = self.segment.membranes
+        self.begin()
+
+    def _accept(self, step: Step) -> None:
+        # The last step is as long as what is left of the run.
+        if step.end < self._scene.latest_time or self.smallest_step is None:
+            duration = float(step.end - step.start)
+            self.smallest_step = min(self.smallest_step or duration, duration)
+        if self.tracker:
+            step = self.tracker.advance(step)
+        self.recorder.record_up_to(step)
+        self.time, self.state = step.end, step.state
+        self.steps += 1
+        self.rejected_steps += step.shortened
+        self.temporal_error += step.local_error
+        self.outcome = self._decide()
+
+    def _decide(self) -> Outcome:
+        history = History(
+            time=self.time,
+            state=self.state,
+            membranes=self.segment.membranes,
+            samples=self.recorder.samples,
+            line_of_centers=self._line_of_centers,
+            long_axis=self._long_axis,
+        )
+        decisions = (criterion.decide(history) for criterion in self._criteria)
+        return next((outcome for outcome in decisions if outcome), Outcome.UNDECIDED)
