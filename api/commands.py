@@ -29,7 +29,7 @@ class TokenAction(StrEnum):
     REVOKE = "revoke"
 
 
-def serve(
+def serve(  # numpydoc ignore=PR01
     host: Annotated[str, typer.Option(help="Address to listen at.")] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen at; 0: a free one.")] = 8000,
     store: StorePath = DEFAULT_STORE,
@@ -41,7 +41,7 @@ def serve(
     api.serve.serve(_settings(store), host, port, workers)
 
 
-def worker(
+def worker(  # numpydoc ignore=PR01
     store: StorePath = DEFAULT_STORE,
     end_with_input: Annotated[
         bool, typer.Option("--end-with-input", help="Stop when standard input is closed.")
@@ -79,7 +79,7 @@ def worker(
         Worker(Jobs(database, opened.path), opened.path).run(stop)
 
 
-def token(
+def token(  # numpydoc ignore=PR01
     action: Annotated[TokenAction, typer.Argument(help="What to do.")],
     name: Annotated[
         str,

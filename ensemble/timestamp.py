@@ -13,7 +13,17 @@ def _in_utc(moment: datetime) -> datetime:
 
 
 def timestamp_text(moment: datetime) -> str:
-    """ISO 8601 in UTC with microseconds always written; a time without a zone is taken as UTC."""
+    """Return a moment as text: ISO 8601 in UTC, microseconds always written.
+
+    Parameters
+    ----------
+    moment : datetime
+        In UTC if it has no time zone.
+
+    Returns
+    -------
+    str
+    """
     return _in_utc(moment).isoformat(timespec="microseconds")
 
 

@@ -33,6 +33,10 @@ def compiled(function: Callable[..., Any] | None = None, **options: Any) -> Any:
         The function.  Left out, a decorator is returned.
     **options
         Further options of `numba.njit`.
+
+    Returns
+    -------
+    callable
     """
     if function is None:
         return lambda function: compiled(function, **options)

@@ -28,7 +28,7 @@ _ONE = _STORED.where(JobRow.id == bindparam("identifier"))
 
 @cache
 def _page(after: bool, owner: bool, status: bool) -> Select[Any]:
-    """The statement for a page of jobs with these conditions."""
+    """Return the statement for a page of jobs with these conditions."""
     query = _STORED.order_by(JobRow.number.desc()).limit(bindparam("limit", type_=Integer))
     if after:
         number = select(JobRow.number).where(JobRow.id == bindparam("after")).scalar_subquery()

@@ -22,7 +22,17 @@ _END_SECONDS = 5.0
 
 
 def mpirun_command(ranks: int, arguments: Sequence[str]) -> list[str]:
-    """Return the command that runs `ensemble` with these arguments on so many ranks, at low priority.
+    """Return the command that runs `ensemble` on several ranks, at low priority.
+
+    Parameters
+    ----------
+    ranks : int
+    arguments : sequence of str
+        Of `ensemble`.
+
+    Returns
+    -------
+    list of str
 
     Raises
     ------
@@ -46,7 +56,7 @@ class Process(AbstractContextManager["Process"]):
     ----------
     command : sequence of str
     log : Path
-        To which is appended what it says on standard error.
+        Its standard error is appended to this file.
     """
 
     def __init__(self, command: Sequence[str], log: Path) -> None:
@@ -67,9 +77,17 @@ class Process(AbstractContextManager["Process"]):
         self._reader.start()
 
     def wait(self, seconds: float) -> int | None:
-        """Wait for the end, so long at most, and return the status; 128 and the signal if one ended it.
+        """Wait for the end of the command.
 
-        None if it is still running.
+        Parameters
+        ----------
+        seconds : float
+            Longest time to wait.
+
+        Returns
+        -------
+        int or None
+            Exit status; 128 and the signal if one ended it.  None if it is still running.
         """
         try:
             status = self._watcher.wait(seconds)
@@ -79,7 +97,7 @@ class Process(AbstractContextManager["Process"]):
         return status if status >= 0 else 128 - status
 
     def output(self) -> str:
-        """Return what it has said on standard output."""
+        """Return its standard output so far."""
         self._output.seek(0)
         return self._output.read()
 

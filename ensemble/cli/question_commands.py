@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ensemble.questions import Answer, Question
 
 
-def bisect(
+def bisect(  # numpydoc ignore=PR01
     study: Document = DEFAULT_STUDY,
     changes: Changes = [],  # noqa: B006  typer copies it
     store: StorePath = DEFAULT_STORE,
@@ -42,7 +42,7 @@ def bisect(
     answer_and_print("study", study, changes, store, ranks_per_run, progress, as_json)
 
 
-def run(
+def run(  # numpydoc ignore=PR01
     scene: Document,
     changes: Changes = [],  # noqa: B006
     store: Annotated[Path | None, typer.Option(metavar="DIR", help="Keep the run in this store.")] = None,

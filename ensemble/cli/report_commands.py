@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from ensemble.store import Store
 
 
-def report(
+def report(  # numpydoc ignore=PR01
     name: Annotated[ReportName, typer.Argument(help="What to report.")],
     quick: Annotated[bool, typer.Option("--quick", help="Minutes instead of hours.")] = False,
     only: Annotated[

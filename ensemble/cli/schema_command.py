@@ -16,7 +16,7 @@ def _kind_names() -> list[str]:
     return [kind.kind for kind in kinds()]
 
 
-def schema(
+def schema(  # numpydoc ignore=PR01
     kind: Annotated[
         str, typer.Argument(metavar="study|scene|…", help="Of which documents.", autocompletion=_kind_names)
     ],

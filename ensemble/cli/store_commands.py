@@ -23,7 +23,7 @@ def _collections() -> list[str]:
     return [kind.collection for kind in kinds() if kind.collection is not None]
 
 
-def query(
+def query(  # numpydoc ignore=PR01
     collection: Annotated[
         str,
         typer.Argument(
@@ -52,7 +52,7 @@ def _all_stored(store: Store, collection: str, where: list[str]) -> StoredAnswer
     raise ValueError(f"{collection!r} — must be one of {', '.join(_collections())}")
 
 
-def show(
+def show(  # numpydoc ignore=PR01
     name: Annotated[str, typer.Argument(metavar="RUN|BOUNDARY", help="Key of either, or a boundary's name.")],
     output: Annotated[
         Path | None,
@@ -81,7 +81,10 @@ def _stored(store: Store, name: str) -> StoredAnswer:
     raise ValueError(f"{name!r} — names none of the {' and '.join(_collections())} in {store.path}")
 
 
-def check(store: StorePath = DEFAULT_STORE, as_json: AsJson = False) -> None:
+def check(  # numpydoc ignore=PR01
+    store: StorePath = DEFAULT_STORE,
+    as_json: AsJson = False,
+) -> None:
     """Verify every run and boundary of a store; the exit status is 1 if anything is wrong."""
     with refusing(), _existing(store) as opened:
         problems = opened.check()
@@ -92,7 +95,7 @@ def check(store: StorePath = DEFAULT_STORE, as_json: AsJson = False) -> None:
     raise typer.Exit(1 if problems else 0)
 
 
-def export(
+def export(  # numpydoc ignore=PR01
     key: Annotated[str, typer.Argument(metavar="RUN", help="Key of the run.")],
     file: Annotated[Path, typer.Argument(metavar="FILE", help="HDF5 file to write.")],
     store: StorePath = DEFAULT_STORE,

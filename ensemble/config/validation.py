@@ -16,9 +16,11 @@ SomeModel = TypeVar("SomeModel", bound=BaseModel)
 
 
 @overload
-def validated(model: type[SomeModel], document: Mapping[str, Any]) -> SomeModel: ...
+def validated(model: type[SomeModel], document: Mapping[str, Any]) -> SomeModel: ...  # numpydoc ignore=GL08
 @overload
-def validated(model: TypeAdapter[Validated], document: Mapping[str, Any]) -> Validated: ...
+def validated(
+    model: TypeAdapter[Validated], document: Mapping[str, Any]
+) -> Validated: ...  # numpydoc ignore=GL08
 def validated(model: type[BaseModel] | TypeAdapter[Any], document: Mapping[str, Any]) -> Any:
     """Return what a document describes.
 
@@ -94,7 +96,7 @@ def describe(problems: Sequence[ErrorDetails], document: Mapping[str, Any]) -> s
 
 
 def _subject(problem: ErrorDetails, document: Mapping[str, Any]) -> str:
-    """What a message is about: a field, and its value."""
+    """Return what a message is about: a field, and its value."""
     location = _without_tags(problem["loc"], document)
     subject = f"{dotted(location)}: " if location else ""
     # For a missing field, or a check on several, the input is the enclosing table: there is no value to show.

@@ -7,8 +7,7 @@ for neighbors); and for each sum the ranks gather the rows of all.  With P point
     t(G) = (pair·P² + point·P)/G + repeated·P + fixed
            + gathers·(latency·⌈log₂ G⌉ + bytes·P·(G − 1)/(G·bandwidth)),
 
-the latency of a collective growing like the depth of its tree (Thakur, Rabenseifner and Gropp, Int. J. High
-Perform. Comput. Appl. 19, 49 (2005)).
+where the latency of a collective grows like the depth of its tree (Thakur, Rabenseifner & Gropp 2005).
 """
 
 from __future__ import annotations
@@ -28,41 +27,113 @@ LEAST_EFFICIENCY: Final = 0.7
 
 
 class ScalingModel(BaseModel):
-    """The constants of the time of one evaluation; seconds, bytes."""
+    """The constants of the time of one evaluation.
+
+    Attributes
+    ----------
+    pair, point : float
+        Seconds for each pair of points, and for each point, that ranks share.
+    repeated, fixed : float
+        Seconds for each point, and for each evaluation, on every rank.
+    gathers : float
+        Collectives in an evaluation.
+    bytes_a_point : float
+        Bytes that each of them gathers for each point.
+    latency : float
+        Seconds of a collective between two ranks.
+    bandwidth : float
+        Bytes a second.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
-    pair: float = Field(ge=0)  # for each pair of points
-    point: float = Field(ge=0)  # for each point
-    repeated: float = Field(ge=0)  # for each point, on every rank
-    fixed: float = Field(ge=0)  # on every rank
-    gathers: float = Field(ge=0)  # collectives in an evaluation
-    bytes_a_point: float = Field(ge=0)  # that each of them gathers
-    latency: float = Field(ge=0)  # of a collective between two ranks
-    bandwidth: float = Field(gt=0)  # bytes a second
+    pair: float = Field(ge=0)
+    point: float = Field(ge=0)
+    repeated: float = Field(ge=0)
+    fixed: float = Field(ge=0)
+    gathers: float = Field(ge=0)
+    bytes_a_point: float = Field(ge=0)
+    latency: float = Field(ge=0)
+    bandwidth: float = Field(gt=0)
 
     def seconds(self, points: float, ranks: int) -> float:
-        """Time of an evaluation with this many points in all."""
+        """Return the seconds of an evaluation.
+
+        Parameters
+        ----------
+        points : float
+            In all.
+        ranks : int
+
+        Returns
+        -------
+        float
+        """
         return self.computing(points, ranks) + self.collectives(points, ranks)
 
     def computing(self, points: float, ranks: int) -> float:
-        """The part of it that a rank computes."""
+        """Return the seconds of an evaluation in which a rank computes.
+
+        Parameters
+        ----------
+        points : float
+            In all.
+        ranks : int
+
+        Returns
+        -------
+        float
+        """
         shared = self.pair * points**2 + self.point * points
         return shared / ranks + self.repeated * points + self.fixed
 
     def collectives(self, points: float, ranks: int) -> float:
-        """The part of it that ranks exchange what they have computed."""
+        """Return the seconds of an evaluation in which ranks exchange what they have computed.
+
+        Parameters
+        ----------
+        points : float
+            In all.
+        ranks : int
+
+        Returns
+        -------
+        float
+        """
         if ranks == 1:
             return 0.0
         volume = self.bytes_a_point * points * (ranks - 1) / ranks
         return self.gathers * (self.latency * math.ceil(math.log2(ranks)) + volume / self.bandwidth)
 
     def efficiency(self, points: float, ranks: int) -> float:
-        """Speed-up over one rank, divided by the ranks."""
+        """Return the speed-up over one rank, divided by the ranks.
+
+        Parameters
+        ----------
+        points : float
+            In all.
+        ranks : int
+
+        Returns
+        -------
+        float
+        """
         return self.seconds(points, 1) / (ranks * self.seconds(points, ranks))
 
     def recommended_ranks(self, points: float, available: int) -> int:
-        """The most ranks, up to those available, that are still as efficient as `LEAST_EFFICIENCY`."""
+        """Return the largest number of ranks that are still as efficient as `LEAST_EFFICIENCY`.
+
+        Parameters
+        ----------
+        points : float
+            In all.
+        available : int
+            Number of ranks.
+
+        Returns
+        -------
+        int
+        """
         enough = [
             ranks for ranks in range(1, available + 1) if self.efficiency(points, ranks) >= LEAST_EFFICIENCY
         ]
@@ -84,7 +155,19 @@ MEASURED: Final = ScalingModel(
 
 
 def recommended_ranks(scene: Scene, available: int, model: ScalingModel = MEASURED) -> int:
-    """How many of the available ranks a run of this scene is worth."""
+    """Return how many of the available ranks should share a run of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+    available : int
+        Number of ranks.
+    model : ScalingModel
+
+    Returns
+    -------
+    int
+    """
     points = scene.numerics.points
     on_each = _AUTOMATIC_POINTS if points == "auto" else points
     return model.recommended_ranks(len(independent_vesicles(scene)) * on_each, available)

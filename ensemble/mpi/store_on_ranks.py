@@ -25,6 +25,10 @@ def whole_store(store: StoreOnRank) -> Store:
     ----------
     store : Store or RunStaging
         From `store_on_ranks`, on the first rank.
+
+    Returns
+    -------
+    Store
     """
     from ensemble.store import Store
 

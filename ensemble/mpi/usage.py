@@ -48,7 +48,7 @@ class UsageMeter:
 
     @property
     def elapsed(self) -> float:
-        """Seconds since the start."""
+        """Time since the start, in seconds."""
         return self._clock() - self._start
 
     @property

@@ -1,4 +1,4 @@
-"""A single scene as a question: what becomes of it?"""
+"""The question what becomes of a single scene."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ _RESULTS = (
 
 
 class SceneQuestion(Question[Scene]):
-    """See `Question`.
+    """The question what becomes of a scene, see `Question`.
 
-    Parameters
+    Attributes
     ----------
     document : Scene
         What is asked.

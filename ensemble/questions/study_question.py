@@ -1,4 +1,4 @@
-"""A study as a question: where is the boundary between outcomes?"""
+"""The question where the boundary between outcomes lies, which is a study."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ _ENDS = 2  # of a bracket, hence limits that are run first, and runs that certif
 
 
 class StudyQuestion(Question[Study]):
-    """See `Question`.
+    """The question where a boundary lies, see `Question`.
 
-    Parameters
+    Attributes
     ----------
     document : Study
         What is asked.

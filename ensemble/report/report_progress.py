@@ -1,4 +1,4 @@
-"""Shows on standard error which run of a report is being made."""
+"""Progress of a report on standard error: which run is being made."""
 
 from __future__ import annotations
 
@@ -13,7 +13,17 @@ Tell = Callable[[str], None]
 
 @contextmanager
 def report_progress(console: Console) -> Iterator[Tell]:
-    """Give a function that takes a line about every run: a live line on a terminal, plain lines elsewhere."""
+    """Give a function that shows a line about every run: a live line on a terminal, plain lines elsewhere.
+
+    Parameters
+    ----------
+    console : Console
+
+    Yields
+    ------
+    callable
+        Takes a line of text.
+    """
     if not console.is_terminal:
         yield lambda line: console.print(line, soft_wrap=True, highlight=False, markup=False)
         return

@@ -138,11 +138,16 @@ class CriticalValueSearch:
         self._prior: _Prior = _UniformPrior() if guess is None else self._prior_of(guess)
 
     def ask(self) -> float | None:
-        """Return the most useful value to try now and mark it as pending; None if there is none.
+        """Return the most useful value to try now and mark it as pending.
 
         Of all values that may narrow the bracket it is the one that halves the most probable interval
         between values that are known or pending.  For a single worker that is bisection.  For several it
         minimizes the interval that is expected to remain after all pending answers.
+
+        Returns
+        -------
+        float or None
+            None if no value is useful now.
         """
         gaps = [gap for region in self._regions() for gap in self._between_pending(*region)]
         if not gaps:

@@ -119,7 +119,7 @@ class PointSearch(Generic[SomeValueSearch]):
 
     @property
     def runs(self) -> list[str]:
-        """Keys of the runs that gave the answers, in the order of their values."""
+        """The keys of the runs that gave the answers, in the order of their values."""
         return [self._answers[value].key for value in sorted(self._answers)]
 
     def outcomes(self, bracket: tuple[float | None, float | None]) -> tuple[str | None, str | None]:

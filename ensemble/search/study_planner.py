@@ -132,7 +132,7 @@ class StudyPlanner:
         )
 
     def _place(self, scene: Scene) -> tuple[float, float] | None:
-        """The place in the study that a run of this scene would have if it is one of the study's."""
+        """Return the place in the study of a run of this scene; None if it is not one of the study's."""
         try:
             at = parameter_value(scene, self._study.sweep.parameter)
             value = parameter_value(scene, self._study.search.parameter)
