@@ -16,7 +16,7 @@ from api.http.middleware import BodyLimits, RequestMetrics, SecurityHeaders
 from api.http.openapi import add_models, shorten_descriptions
 from api.jobs.job import NoSuchJob
 from api.jobs.submissions import Submission
-from api.routes import boundaries, flows, jobs, operations, presets, runs
+from api.routes import boundaries, flows, jobs, kinds, operations, presets, runs
 from api.routes.operations import JobMetrics
 from api.routes.service import Service
 from api.routes.web_page import add_web_page
@@ -78,6 +78,7 @@ def create_app(service: Service, lifespan: Lifespan[FastAPI] | None = None) -> F
         runs.router,
         boundaries.router,
         presets.router,
+        kinds.router,
         flows.router,
         operations.metrics_router,
     ):

@@ -1,6 +1,9 @@
-/** The fields of a study or a scene as a form offers them, by the dotted paths of the command line's `--set`. */
+/** The fields of a document as a form offers them, by the dotted paths of the command line's `--set`. */
 
+import { sceneIn } from "./kinds.js";
 import { quantity } from "./symbols.js";
+
+/** @typedef {import("./kinds.js").Kind} Kind */
 
 /**
  * @typedef {object} Field
@@ -23,7 +26,7 @@ const OF_SCENE = [
   "numerics.points",
   "numerics.tolerance",
 ];
-const OF_STUDY = ["sweep.values", "search.limits", "search.tolerance", "search.certify"];
+const VARIED = /(?:^|\.)parameter$/;
 const LABELS = /** @type {Record<string, string>} */ ({
   horizon: "time to simulate",
   "numerics.points": "points on each vesicle",
@@ -38,25 +41,26 @@ const LABELS = /** @type {Record<string, string>} */ ({
 });
 
 /**
- * @param {any} document - A study or a scene in full.
+ * @param {any} document - In full.
+ * @param {Kind} kind - Which kind of question it asks.
  * @returns {Field[]} The principal ones first, in the order in which people think of them.
  */
-export function fieldsOf(document) {
-  const isStudy = "search" in document;
-  const searched = isStudy ? [document.sweep.parameter, document.search.parameter] : [];
-  const prefix = isStudy ? "scene." : "";
-  const ofScene = OF_SCENE.filter((path) => !searched.includes(path)).map((path) => prefix + path);
-  const principal = isStudy ? [...OF_STUDY, ...ofScene] : ofScene;
-  const hidden = searched.map((path) => prefix + path); // the study itself varies these
+export function fieldsOf(document, kind) {
+  const all = leaves(document);
+  const prefix = kind.scene_path ? `${kind.scene_path}.` : "";
+  // A field called `parameter` names the field of the scene that the question itself varies.
+  const varied = all.filter(([path]) => VARIED.test(path)).map(([, name]) => `${prefix}${name}`);
+  const ofScene = OF_SCENE.map((path) => prefix + path);
+  const principal = [...kind.principal_fields, ...ofScene].filter((path) => !varied.includes(path));
   const rank = (/** @type {Field} */ { path }) =>
     principal.includes(path) ? principal.indexOf(path) : principal.length;
 
-  return leaves(document)
-    .filter(([path]) => !hidden.includes(path))
+  return all
+    .filter(([path]) => !varied.includes(path))
     .map(([path, value]) => ({
       path,
       value,
-      label: label(path, prefix, document),
+      label: label(path, prefix, new Map(all), sceneIn(document, kind)),
       isPrincipal: principal.includes(path),
     }))
     .sort((first, second) => rank(first) - rank(second));
@@ -64,15 +68,17 @@ export function fieldsOf(document) {
 
 /**
  * @param {string} path
- * @param {string} prefix
- * @param {any} document
+ * @param {string} prefix - Of the paths in the scene.
+ * @param {Map<string, unknown>} values - All of the document, by path.
+ * @param {any} scene
  */
-function label(path, prefix, document) {
-  const inScene = path.startsWith(prefix) ? path.slice(prefix.length) : path;
-  if (path === "sweep.values") {
-    return `values of the ${quantity(document.sweep.parameter, document.scene).name}`;
+function label(path, prefix, values, scene) {
+  const varied = path.endsWith("values") ? values.get(path.replace(/values$/, "parameter")) : undefined;
+  if (typeof varied === "string") {
+    return `values of the ${quantity(varied, scene).name}`;
   }
-  const { name, symbol } = quantity(inScene, prefix ? document.scene : document);
+  const inScene = path.startsWith(prefix) ? path.slice(prefix.length) : path;
+  const { name, symbol } = quantity(inScene, scene);
   return LABELS[inScene] ?? (name === symbol ? path : `${name} ${symbol}`);
 }
 

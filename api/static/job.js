@@ -2,14 +2,15 @@
 
 import { remove } from "./api.js";
 import { element } from "./dom.js";
+import { kindNamed } from "./kinds.js";
 import { alertAbout } from "./problems.js";
 
 /**
  * @typedef {object} Job
  * @property {string} id
- * @property {"study" | "scene"} kind
+ * @property {string} kind
  * @property {string} name
- * @property {string} key - Key of the resulting boundary or run.
+ * @property {string} key - Key of the answer.
  * @property {number} ranks
  * @property {"accepted" | "running" | "succeeded" | "failed" | "dismissed"} status
  * @property {number} progress - Percent.
@@ -38,15 +39,16 @@ export function progressOf({ progress }) {
 }
 
 /**
- * Make a link to the result. The diagram of a study exists while it is traced, a run when it has finished.
+ * Make a link to the answer, if there is one already and the page can show it.
  *
  * @param {Job} job
  */
 export function resultLink({ kind, key, status }) {
-  if (kind === "study") {
-    return status === "accepted" ? null : element("a", { href: `#/boundaries/${key}` }, "Diagram");
-  }
-  return status === "succeeded" ? element("a", { href: `#/runs/${key}` }, "Run") : null;
+  const { collection, answer_title: title, answer_grows: grows } = kindNamed(kind);
+  const exists = grows ? status !== "accepted" : status === "succeeded";
+  return collection && exists
+    ? element("a", { href: `#/${collection}/${key}` }, title.charAt(0).toUpperCase() + title.slice(1))
+    : null;
 }
 
 /** @param {Job} job */

@@ -1,5 +1,6 @@
 /** Starts the page: the routes, the colors, and nothing else. */
 
+import { loadKinds } from "./kinds.js";
 import { startRouter } from "./router.js";
 import { loadFlows } from "./symbols.js";
 import { startTheme } from "./theme.js";
@@ -11,22 +12,23 @@ import { showRuns } from "./views/runs.js";
 import { showSubmission } from "./views/submission.js";
 
 /**
- * A view that names the parameters of scenes.
+ * A view that needs what some functions load.
  *
  * @param {(place: import("./router.js").Place) => Promise<void>} show
+ * @param {((signal: AbortSignal) => Promise<void>)[]} loading
  */
-const naming = (show) => async (/** @type {import("./router.js").Place} */ place) => {
-  await loadFlows(place.signal);
+const after = (show, ...loading) => async (/** @type {import("./router.js").Place} */ place) => {
+  await Promise.all(loading.map((load) => load(place.signal)));
   await show(place);
 };
 
 startTheme();
 startRouter([
-  { path: /^\/(?:boundaries)?$/, section: "boundaries", show: naming(showBoundaries) },
-  { path: /^\/boundaries\/(?<key>[0-9a-f]{16})$/, section: "boundaries", show: naming(showBoundaries) },
-  { path: /^\/runs$/, section: "runs", show: naming(showRuns) },
-  { path: /^\/runs\/(?<key>[0-9a-f]{32})$/, section: "runs", show: naming(showRun) },
-  { path: /^\/jobs$/, section: "jobs", show: showJobs },
-  { path: /^\/jobs\/(?<id>[0-9a-z-]+)$/, section: "jobs", show: showJob },
-  { path: /^\/new$/, section: "new", show: naming(showSubmission) },
+  { path: /^\/(?:boundaries)?$/, section: "boundaries", show: after(showBoundaries, loadFlows) },
+  { path: /^\/boundaries\/(?<key>[0-9a-f]{16})$/, section: "boundaries", show: after(showBoundaries, loadFlows) },
+  { path: /^\/runs$/, section: "runs", show: after(showRuns, loadFlows) },
+  { path: /^\/runs\/(?<key>[0-9a-f]{32})$/, section: "runs", show: after(showRun, loadFlows) },
+  { path: /^\/jobs$/, section: "jobs", show: after(showJobs, loadKinds) },
+  { path: /^\/jobs\/(?<id>[0-9a-z-]+)$/, section: "jobs", show: after(showJob, loadFlows, loadKinds) },
+  { path: /^\/new$/, section: "new", show: after(showSubmission, loadFlows, loadKinds) },
 ]);

@@ -15,7 +15,7 @@ from ensemble.cli import question_commands, report_commands, schema_command, sto
 from ensemble.errors import BadInput
 from ensemble.mpi.world import only_first_rank_speaks, pin_threads
 
-COMMANDS = "ensemble.commands"  # entry point group: functions that other packages add as commands
+GROUP = "ensemble.commands"  # of entry points: functions that other distributions add as commands
 
 app = typer.Typer(
     help="When do two adhering vesicles stay together in a flow?",
@@ -23,13 +23,9 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 for _command in (
-    question_commands.bisect,
-    question_commands.run,
-    store_commands.query,
-    store_commands.show,
+    *question_commands.COMMANDS,
+    *store_commands.COMMANDS,
     report_commands.report,
-    store_commands.check,
-    store_commands.export,
     schema_command.schema,
 ):
     app.command()(_command)
@@ -58,7 +54,7 @@ def _options(
 def main() -> None:
     """Run the command line; exit status 2 and one message for bad input."""
     pin_threads()
-    for command in entry_points(group=COMMANDS):
+    for command in entry_points(group=GROUP):
         app.command(command.name)(command.load())
     with only_first_rank_speaks():
         try:

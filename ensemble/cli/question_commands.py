@@ -57,6 +57,9 @@ def run(  # numpydoc ignore=PR01
     answer_and_print("scene", scene, changes, store, ranks_per_run, progress, as_json)
 
 
+COMMANDS = (bisect, run)
+
+
 def answer_and_print(
     kind: str,
     name_or_path: str,

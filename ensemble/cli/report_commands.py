@@ -88,9 +88,12 @@ def _scaling(quick: bool, store: Path) -> FinishedReport | None:
     from ensemble.report.scaling.make_scaling import make_scaling
 
     communicator = world()
-    with abort_guard(communicator):
-        with store_on_ranks(communicator, store) as opened, report_progress(Console(stderr=True)) as tell:
-            return make_scaling(communicator, opened, quick, tell)
+    with (
+        abort_guard(communicator),
+        store_on_ranks(communicator, store) as opened,
+        report_progress(Console(stderr=True)) as tell,
+    ):
+        return make_scaling(communicator, opened, quick, tell)
 
 
 def _measurements(name: ReportName, quick: bool, store: Path) -> FinishedReport | None:

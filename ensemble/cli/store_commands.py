@@ -107,6 +107,9 @@ def export(  # numpydoc ignore=PR01
         export_run(opened.summary(key), opened.load(key), file)
 
 
+COMMANDS = (query, show, check, export)
+
+
 def _existing(path: Path) -> Store:
     from ensemble.store import Store
 

@@ -5,13 +5,14 @@ The command line and the service know nothing of kinds but what `Question` state
 1. Write the model of its documents as a subclass of `solver.scene.Model`, with a top-level key (the *marker*)
    that no other kind has.
 2. Subclass `Question` in a module of this folder: `kind`, `document_type`, `marker`, `command` and `title`,
-   then `check_size`, `key`, `scene`, `planned_runs`, `answer` and `summary`.  `ensemble.mpi.run_study` has
-   `run_batch` for scenes that are all known beforehand, and `run_queue` for those that follow from outcomes.
+   then `check_size`, `planned_runs`, `answer` and `summary`.  `ensemble.mpi.run_study` has `run_batch` for
+   scenes that are all known beforehand, and `run_queue` for those that follow from outcomes.
 3. Enter the class in `KINDS` below.  Another distribution enters its own under the entry point group
    `ensemble.questions` instead.
 4. Add its command to `ensemble.cli.question_commands`: a signature and one call of `answer_and_print`.
 5. If the store keeps the answers, and not only the runs, override `stored` and `all_stored`.
-6. Ship a preset in `ensemble/presets/`, and test it: `tests/ensemble/questions/test_new_kind.py` adds a kind.
+6. Ship a preset in `ensemble/presets/`, and test it.  `tests/scan_kind.py` is a whole kind in 80 lines, which
+   `tests/api/test_added_kind.py` carries through the command line and the service.
 """
 
 from __future__ import annotations

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar
 
@@ -25,6 +27,8 @@ if TYPE_CHECKING:
     from ensemble.store import Store
 
 SomeDocument = TypeVar("SomeDocument", bound=Model)
+
+KEY_DIGITS = 32  # hexadecimal
 
 
 class Answer(ABC):
@@ -223,15 +227,17 @@ class Question(ABC, Generic[SomeDocument]):
 
     # What the question is.
 
-    @property
-    @abstractmethod
+    @cached_property
     def key(self) -> str:
         """Key of its answer: equal questions have equal keys."""
+        return hashlib.sha256(f"{self.kind} {self.text}".encode()).hexdigest()[:KEY_DIGITS]
 
     @property
-    @abstractmethod
     def scene(self) -> Scene:
-        """A scene like those that are run, which decides how many ranks pay off for a run."""
+        """The scene in its document, which decides how many ranks pay off for a run."""
+        document: Any = self.document
+        scene: Scene = attrgetter(self.scene_path)(document) if self.scene_path else document
+        return scene
 
     @cached_property
     def fields(self) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -69,15 +70,10 @@ class SceneQuestion(Question[Scene]):
         """
         limit_vesicles(document, MOST_VESICLES)
 
-    @property
+    @cached_property
     def key(self) -> str:
-        """See `Question`."""
+        """Key of the run."""
         return run_key(self.document)
-
-    @property
-    def scene(self) -> Scene:
-        """See `Question`."""
-        return self.document
 
     def planned_runs(self) -> list[tuple[Scene, int]]:
         """See `Question`."""

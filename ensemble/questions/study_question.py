@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from statistics import fmean
 from typing import TYPE_CHECKING, Any
@@ -67,15 +68,10 @@ class StudyQuestion(Question[Study]):
         limit_vesicles(document, MOST_VESICLES_SWEPT, "scene")
         limit_elements(document, MOST_SWEEP_VALUES, "sweep", "values")
 
-    @property
+    @cached_property
     def key(self) -> str:
-        """See `Question`."""
+        """Key of the study."""
         return self.document.key
-
-    @property
-    def scene(self) -> Scene:
-        """See `Question`."""
-        return self.document.scene
 
     def planned_runs(self) -> Iterator[tuple[Scene, int]]:
         """See `Question`.  A search runs both limits and then halves the distance between them."""

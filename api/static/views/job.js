@@ -5,6 +5,7 @@ import { followBoundary } from "../boundary.js";
 import { definitions, element } from "../dom.js";
 import { dateAndTime, duration, words } from "../format.js";
 import { cancelButton, isUnfinished, progressOf, resultLink } from "../job.js";
+import { kindNamed } from "../kinds.js";
 import { Problem, alertAbout, messageOf } from "../problems.js";
 
 /** @typedef {import("../job.js").Job} Job */
@@ -57,7 +58,7 @@ function heading(job) {
       { class: "heading" },
       element("h1", {}, words(job.name)),
       cancelButton(job),
-      element("p", {}, job.kind === "study" ? "Job that traces a boundary" : "Job that simulates one scene"),
+      element("p", {}, kindNamed(job.kind).title),
     ),
     element(
       "div",
@@ -83,7 +84,8 @@ function heading(job) {
  * @param {AbortSignal} signal
  */
 function showResult(place, job, signal) {
-  if (job.kind !== "study" || job.status === "accepted" || place.dataset.followed) {
+  const isDrawn = kindNamed(job.kind).collection === "boundaries";
+  if (!isDrawn || job.status === "accepted" || place.dataset.followed) {
     return;
   }
   place.dataset.followed = "true";

@@ -5,6 +5,7 @@ import { element } from "../dom.js";
 import { fieldsOf } from "../fields.js";
 import { number, words } from "../format.js";
 import { FieldInput, FurtherChanges } from "../inputs.js";
+import { kindNamed, kinds, sceneIn } from "../kinds.js";
 import { alertAbout, messageOf } from "../problems.js";
 import { goTo } from "../router.js";
 
@@ -12,6 +13,7 @@ import { goTo } from "../router.js";
  * @typedef {object} Template - What the form submits, apart from the changes.
  * @property {string} title
  * @property {any} document
+ * @property {string} kind - Which kind of question it asks.
  * @property {{preset: string} | {scene: any}} origin
  */
 
@@ -45,11 +47,12 @@ async function templateOf(query, presets, signal) {
   const run = query.get("run");
   if (run) {
     const { scene } = await get(`/runs/${run}`, signal);
-    return { title: `Scene of run ${run.slice(0, 8)}`, document: scene, origin: { scene } };
+    return { title: `Scene of run ${run.slice(0, 8)}`, document: scene, kind: "scene", origin: { scene } };
   }
   const wanted = query.get("preset") ?? USUAL_PRESET;
   const preset = presets.find(({ name }) => name === wanted) ?? presets[0];
-  return { title: words(preset.name), document: preset.document, origin: { preset: preset.name } };
+  const { name, document, kind } = preset;
+  return { title: words(name), document, kind, origin: { preset: name } };
 }
 
 /**
@@ -57,13 +60,13 @@ async function templateOf(query, presets, signal) {
  * @param {string | null} current
  */
 function choices(presets, current) {
-  const shelf = (/** @type {string} */ title, /** @type {string} */ wanted) => [
-    element("h2", {}, title),
+  const shelf = (/** @type {import("../kinds.js").Kind} */ wanted) => [
+    element("h2", {}, wanted.title),
     element(
       "ul",
       {},
       ...presets
-        .filter(({ kind }) => kind === wanted)
+        .filter(({ kind }) => kind === wanted.kind)
         .map(({ name, document, estimate }) =>
           element(
             "li",
@@ -72,18 +75,18 @@ function choices(presets, current) {
               "a",
               { href: `#/new?preset=${name}`, "aria-current": name === current ? "true" : null },
               element("strong", {}, words(name)),
-              element("span", {}, wanted === "study" ? `up to ${estimate.runs} runs` : contents(document)),
+              element(
+                "span",
+                {},
+                wanted.has_many_runs ? `up to ${estimate.runs} runs` : contents(sceneIn(document, wanted)),
+              ),
             ),
           ),
         ),
     ),
   ];
-  return element(
-    "nav",
-    { class: "shelf", "aria-label": "Presets" },
-    ...shelf("Trace a boundary", "study"),
-    ...shelf("Simulate one scene", "scene"),
-  );
+  const used = kinds().filter((wanted) => presets.some(({ kind }) => kind === wanted.kind));
+  return element("nav", { class: "shelf", "aria-label": "Presets" }, ...used.flatMap(shelf));
 }
 
 /** @param {any} scene */
@@ -118,7 +121,7 @@ class SubmissionForm {
   constructor(template, signal) {
     this.template = template;
     this.signal = signal;
-    this.inputs = fieldsOf(template.document).map((field) => new FieldInput(field));
+    this.inputs = fieldsOf(template.document, kindNamed(template.kind)).map((field) => new FieldInput(field));
     this.further = new FurtherChanges();
     this.ranks = limitInput("ranks");
     this.seconds = limitInput("seconds");
