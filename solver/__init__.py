@@ -7,12 +7,25 @@ and returns a `Run`.  `README.md` beside this file states the method.
 from typing import TYPE_CHECKING, Any
 
 from solver.analysis.run import Energy, Errors, Frames, Outcome, Run, Series, Viscosity, Work
+from solver.revision import RESULTS_REVISION
 from solver.scene import Scene
 
 if TYPE_CHECKING:
     from solver.simulation.simulate import simulate
 
-__all__ = ["Energy", "Errors", "Frames", "Outcome", "Run", "Scene", "Series", "Viscosity", "Work", "simulate"]
+__all__ = [
+    "RESULTS_REVISION",
+    "Energy",
+    "Errors",
+    "Frames",
+    "Outcome",
+    "Run",
+    "Scene",
+    "Series",
+    "Viscosity",
+    "Work",
+    "simulate",
+]
 
 
 def __getattr__(name: str) -> Any:

@@ -120,7 +120,7 @@ def runs_table(summaries: Sequence[RunSummary]) -> Table:
     -------
     Table
     """
-    table = Table(_whole("run"), "outcome", "flow", "rate", "hamaker")
+    table = Table(_whole("run"), "outcome", "flow", "rate", "hamaker", "revision")
     for summary in summaries:
         flow, adhesion = summary.scene.flow, summary.scene.adhesion
         table.add_row(
@@ -129,6 +129,7 @@ def runs_table(summaries: Sequence[RunSummary]) -> Table:
             _ABSENT if flow is None else flow.kind,
             _ABSENT if flow is None else _number(flow.rate),
             _ABSENT if adhesion is None else _number(adhesion.hamaker),
+            _number(summary.results_revision),
         )
     return table
 

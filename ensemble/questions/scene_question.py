@@ -204,7 +204,7 @@ def run_document(summary: RunSummary) -> dict[str, Any]:
     return (
         {name: document[name] for name in _RESULTS}
         | {name: document["work"][name] for name in _WORK}
-        | {"run_key": summary.key}
+        | {"run_key": summary.key, "results_revision": summary.results_revision}
     )
 
 

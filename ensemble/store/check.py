@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 
-from ensemble.config.run_key import DISTRIBUTION, run_key
+from ensemble.config.run_key import run_key
 from ensemble.errors import StoreError
 from ensemble.store.archive import read_run, read_summary
 from ensemble.store.run_record import RunSummary
 from solver.analysis.run import Outcome, Run
+from solver.revision import RESULTS_REVISION
 
 
 def check_run(directory: Path, summary: RunSummary) -> list[str]:
@@ -39,7 +39,7 @@ def check_run(directory: Path, summary: RunSummary) -> list[str]:
         problems.append(f"{name}: its attributes differ from its row in the catalog")
     if summary.key != directory.name:
         problems.append(f"{name}: its row has the key {summary.key}")
-    if summary.versions.get(DISTRIBUTION) == version(DISTRIBUTION) and run_key(stored.scene) != stored.key:
+    if summary.results_revision == RESULTS_REVISION and run_key(stored.scene) != stored.key:
         problems.append(f"{name}: its key is not that of its scene")
     return problems
 

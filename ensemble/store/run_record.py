@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from ensemble.config.run_key import DISTRIBUTION, run_key
 from ensemble.timestamp import Timestamp, now
 from solver.analysis.run import Array, Energy, Errors, Frames, Outcome, Run, Viscosity, Work
+from solver.revision import RESULTS_REVISION
 from solver.scene import Scene
 
 RESULT_PACKAGES = (DISTRIBUTION, "numpy", "scipy", "numba")
@@ -22,7 +23,8 @@ class RunSummary(BaseModel):
     """Everything about a run except its arrays.  Its JSON is the attributes of the run's files.
 
     Results have the names, units and None of `solver.analysis.run.Run`; `series` and `vesicle_series` name
-    the recorded diagnostics, `versions` the packages that the numbers depend on.
+    the recorded diagnostics, `versions` the packages that the numbers depend on.  `results_revision` is the
+    solver's `RESULTS_REVISION`; None in records from before it was counted.
     """
 
     # Strings keep NaN and infinity, which a failed run may carry, inside the JSON standard.
@@ -31,6 +33,7 @@ class RunSummary(BaseModel):
     key: str
     created: Timestamp
     versions: dict[str, str]
+    results_revision: int | None = None
     scene: Scene
     outcome: Outcome
     failure: str | None
@@ -64,13 +67,14 @@ class RunSummary(BaseModel):
             key=run_key(run.scene),
             created=now(),
             versions=versions | {"python": platform.python_version()},
+            results_revision=RESULTS_REVISION,
             series=tuple(sorted(run.series)),
             vesicle_series=tuple(sorted(run.vesicle_series)),
             **results,
         )
 
 
-_OTHERS = ("key", "created", "versions", "series", "vesicle_series")
+_OTHERS = ("key", "created", "versions", "results_revision", "series", "vesicle_series")
 # The fields of a run that its summary holds unchanged.
 RESULTS = tuple(name for name in RunSummary.model_fields if name not in _OTHERS)
 

@@ -31,6 +31,7 @@ RUN_FIELDS = {
     "rhs_evaluations",
     "wall_seconds",
     "run_key",
+    "results_revision",
 }
 POINT_FIELDS = {
     "parameters",

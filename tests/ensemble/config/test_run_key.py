@@ -84,9 +84,9 @@ def test_leaving_a_term_out_changes_the_key() -> None:
     assert len({run_key(Scene.model_validate(document)) for document in variants}) == 3
 
 
-def test_solver_version_is_part_of_the_key(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_revision_of_the_results_is_part_of_the_key(monkeypatch: pytest.MonkeyPatch) -> None:
     before = run_key(quiescent_scene())
-    monkeypatch.setattr(keys, "_solver_version", lambda: "0.0.0+other")
+    monkeypatch.setattr(keys, "RESULTS_REVISION", keys.RESULTS_REVISION + 1)
     assert run_key(quiescent_scene()) != before
 
 
