@@ -1,4 +1,4 @@
-"""Filters ``path op value``, such as ``flow.rate>=0.5``, checked against a model and evaluated in SQL."""
+"""Filters ``path op value``, such as ``flow.rate>=0.5``: checked against a model, evaluated in SQL."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from datetime import datetime
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from pydantic import BaseModel, TypeAdapter, ValidationError
+from pydantic.fields import FieldInfo
 from sqlalchemy import ColumnElement, String, case, false
 from sqlalchemy.ext.compiler import compiles
 from sqlalchemy.orm import InstrumentedAttribute
@@ -20,6 +21,7 @@ from sqlalchemy.sql.functions import GenericFunction
 
 from ensemble.errors import StoreInputError
 from ensemble.timestamp import timestamp_text
+from solver.registry import RegisteredNames, Registry
 
 COMPARISONS = {
     "=": operator.eq,
@@ -31,14 +33,22 @@ COMPARISONS = {
 }
 EQUALITIES = ("=", "!=")
 PATTERN = re.compile(r"\s*(?P<path>\w+(?:\.\w+)*)\s*(?P<sign><=|>=|!=|=|<|>)\s*(?P<value>[^\s=<>].*?)\s*")
-# What databases call the types of JSON.
+# The names that databases have for the types of JSON.
 NUMBERS = ("number", "integer", "real")
-BOOLEANS = ("boolean", "integer")  # SQLite takes 1 and 0 out of a document for true and false
+BOOLEANS = ("boolean", "integer")  # SQLite reads true and false as 1 and 0
 
 
 @dataclass(frozen=True)
 class Field:
-    """Where a field lies in the JSON document, and its type."""
+    """A field of a record.
+
+    Attributes
+    ----------
+    location : tuple of str or int
+        Keys and indices that lead to it in the JSON document.
+    annotation : any
+        Its type.
+    """
 
     location: tuple[str | int, ...]
     annotation: Any
@@ -48,15 +58,39 @@ Fields = Mapping[str, Field]
 
 
 def model_fields(model: type[BaseModel], *prefix: str) -> dict[str, Field]:
-    """Top-level fields of a model whose JSON lies at `prefix` in the document."""
-    return {name: Field((*prefix, name), info.annotation) for name, info in model.model_fields.items()}
+    """Return the top-level fields of a model.
+
+    Parameters
+    ----------
+    model : type of BaseModel
+    *prefix : str
+        Keys that lead to the JSON of the model in a document.
+
+    Returns
+    -------
+    dict of str to Field
+    """
+    return {name: Field((*prefix, name), _declared_type(info)) for name, info in model.model_fields.items()}
+
+
+def _declared_type(info: FieldInfo) -> Any:
+    """Return the type of a field together with its registry, which pydantic keeps apart from the type."""
+    registries = [each for each in info.metadata if isinstance(each, Registry | RegisteredNames)]
+    return Annotated[info.annotation, registries[0]] if registries else info.annotation
 
 
 def _alternatives(annotation: Any) -> Iterator[Any]:
-    """Types that a value may have, with unions and annotations taken apart and None left out."""
+    """Yield the types that a value may have: unions are taken apart, registries looked up, None left out."""
     origin = get_origin(annotation)
     if origin is Annotated:
-        yield from _alternatives(get_args(annotation)[0])
+        kind, *metadata = get_args(annotation)
+        match metadata[0]:
+            case Registry() as models:
+                yield from models
+            case RegisteredNames() as names:
+                yield Literal[tuple(names)]
+            case _:
+                yield from _alternatives(kind)
     elif origin in (Union, types.UnionType):
         for member in get_args(annotation):
             yield from _alternatives(member)
@@ -65,7 +99,7 @@ def _alternatives(annotation: Any) -> Iterator[Any]:
 
 
 def _members(annotation: Any, segment: str) -> Iterator[tuple[str | int, Any]]:
-    """Key in the JSON document and type of what `segment` names inside a value of this type."""
+    """Yield the key in the JSON document, and the type, of what a segment names inside a value."""
     origin, arguments = get_origin(annotation), get_args(annotation)
     if origin is dict:
         yield segment, arguments[1]
@@ -80,7 +114,7 @@ def _members(annotation: Any, segment: str) -> Iterator[tuple[str | int, Any]]:
             yield segment, hints[segment]
     elif isinstance(annotation, type) and issubclass(annotation, BaseModel):
         if segment in annotation.model_fields:
-            yield segment, annotation.model_fields[segment].annotation
+            yield segment, _declared_type(annotation.model_fields[segment])
     elif annotation is Any:
         yield segment, Any
 
@@ -104,7 +138,7 @@ def _is_sequence(annotation: Any) -> bool:
 
 
 class json_type(GenericFunction[str]):  # noqa: N801  SQLAlchemy takes the name of the function from it
-    """Type of a JSON value, in the database's words."""
+    """Type of a JSON value, as the database names it."""
 
     type = String()
     inherit_cache = True
@@ -118,7 +152,7 @@ def _json_typeof(function: json_type, compiler: SQLCompiler, **options: Any) -> 
 def _of_kind(
     element: ColumnElement[Any], kinds: Sequence[str], comparison: ColumnElement[bool]
 ) -> ColumnElement[bool]:
-    """Compare values of these types, and no text that a server would fail to convert (such as "NaN")."""
+    """Compare only values of these types: a server would fail to convert text such as "NaN"."""
     return case((json_type(element).in_(kinds), comparison), else_=false())
 
 
@@ -131,7 +165,7 @@ def _parse(text: str, path: str, annotation: Any) -> Any:
 
 
 def _apparent_type(text: str) -> type:
-    """Type of a value to compare with a field that has no declared type."""
+    """Return the type of a value that is compared with a field of no declared type."""
     for kind in (float, bool):
         try:
             TypeAdapter(kind).validate_strings(text)
@@ -142,7 +176,7 @@ def _apparent_type(text: str) -> type:
 
 
 def _joined(kinds: set[Any]) -> Any:
-    """Union of types, with literals joined to one so that a message lists all that is allowed."""
+    """Return a union of types; literals become one, so that a message lists everything that is allowed."""
     if all(get_origin(kind) is Literal for kind in kinds):
         return Literal[tuple(sorted(word for kind in kinds for word in get_args(kind)))]
     return Union[tuple(kinds)]  # noqa: UP007
@@ -164,13 +198,17 @@ def condition(text: str, document: InstrumentedAttribute[Any], fields: Fields) -
         ``path op value`` with op one of = != < <= > >=; text, true/false and null compare by = and != only.
     document : column
         JSON of the records.
-    fields : mapping
-        What a path may begin with.
+    fields : mapping of str to Field
+        The fields with which a path may begin.
+
+    Returns
+    -------
+    ColumnElement of bool
 
     Raises
     ------
     StoreInputError
-        If the filter is malformed, the field is unknown, or the value is none of its type.
+        If the filter is malformed, the field is unknown, or the value does not have its type.
     """
     match = PATTERN.fullmatch(text)
     if match is None or "\0" in text:  # PostgreSQL knows no text with one
@@ -207,5 +245,19 @@ def condition(text: str, document: InstrumentedAttribute[Any], fields: Fields) -
 def conditions(
     where: Sequence[str], document: InstrumentedAttribute[Any], fields: Fields
 ) -> list[ColumnElement[bool]]:
-    """Conditions of several filters, all of which a record has to meet."""
+    """Turn several filters, all of which a record must meet, into conditions on a JSON column.
+
+    Parameters
+    ----------
+    where : sequence of str
+        Filters as `condition` takes them.
+    document : column
+        JSON of the records.
+    fields : mapping of str to Field
+        The fields with which a path may begin.
+
+    Returns
+    -------
+    list of ColumnElement of bool
+    """
     return [condition(text, document, fields) for text in where]

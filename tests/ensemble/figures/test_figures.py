@@ -59,7 +59,8 @@ def test_the_settings_of_a_user_change_no_figure(tmp_path: Path) -> None:
     """A file of settings, such as people have in their home directory, that breaks or changes plots."""
     (tmp_path / "matplotlibrc").write_text(
         "text.usetex: True\naxes.grid: True\npath.sketch: 3, 100, 2\nlines.linewidth: 9\nfont.size: 30\n"
-        "axes.facecolor: red\nsavefig.bbox: tight\nfigure.constrained_layout.use: True\naxes.unicode_minus: False\n"
+        "axes.facecolor: red\nsavefig.bbox: tight\nfigure.constrained_layout.use: True\n"
+        "axes.unicode_minus: False\n"
     )
     code = (
         "import sys; from pathlib import Path; from ensemble.figures import run_figure, save;"

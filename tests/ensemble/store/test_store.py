@@ -5,12 +5,10 @@ from __future__ import annotations
 import json
 import os
 import pickle
-import random
 import shutil
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -37,13 +35,53 @@ def numbered_run(number):
     return shear_run(shear_scene(rate=1 + number / 128), seed=number)
 """
 
-SAVE_FOREVER = """
-number = int(sys.argv[2])
-with Store.open(Path(sys.argv[1])) as store:
-    while True:
-        store.save(numbered_run(number))
-        print(number, flush=True)
-        number += 1
+# One process that has imported everything forks a writer, kills it, and looks at what it left; twenty times.
+# It forks to look, too, and so never starts a thread, which its children would lack.
+KILL_WRITERS = """
+import os, random, signal, time
+import ensemble.store.archive
+from ensemble.config.run_key import run_key
+from ensemble.store.run_record import RunSummary
+
+RunSummary.of(numbered_run(0))  # imports what runs need
+path, acknowledged, torn, moment = Path(sys.argv[1]), [], 0, random.Random(11)
+
+def save_forever(number, acknowledgements):
+    with Store.open(path) as store:
+        while True:
+            store.save(numbered_run(number))
+            print(number, file=acknowledgements, flush=True)
+            number += 1
+
+def look():
+    with Store.open(path) as store:
+        assert list((path / "staging").iterdir()) == []
+        directories = {entry.name for entry in (path / "runs").iterdir()}
+        assert directories == {summary.key for summary in store.summaries()}
+        assert all(store.contains(run_key(numbered_run(number).scene)) for number in acknowledged)
+
+def forked(function, *arguments):
+    child = os.fork()
+    if child:
+        return child
+    function(*arguments)
+    os._exit(0)
+
+for _ in range(20):
+    # The run that was underway when the last writer was killed may or may not be there.
+    number = max(acknowledged, default=-1) + 2
+    read, write = os.pipe()
+    with open(read) as lines:
+        with open(write, "w") as acknowledgements:
+            writer = forked(save_forever, number, acknowledgements)
+        first = lines.readline()
+        time.sleep(moment.uniform(0, 0.25))
+        os.kill(writer, signal.SIGKILL)
+        acknowledged += map(int, (first + lines.read()).split())
+    os.waitpid(writer, 0)
+    torn += any((path / "staging").glob("*/*.partial"))
+    assert os.waitpid(forked(look), 0)[1] == 0
+print(torn, *acknowledged)
 """
 
 SAVE_AND_SWEEP = """
@@ -238,22 +276,10 @@ def test_existing_creates_nothing(tmp_path: Path) -> None:
 
 def test_kill_at_any_moment_loses_no_acknowledged_run(tmp_path: Path) -> None:
     path = tmp_path / "store"
-    moment = random.Random(11)
-    acknowledged: list[int] = []
-    torn = 0
-    for _ in range(20):
-        number = max(acknowledged, default=-1) + 2  # the one that was underway may or may not be there
-        with start(SAVE_FOREVER, path, number) as writer:
-            assert writer.stdout is not None
-            lines = writer.stdout.readline()
-            time.sleep(moment.uniform(0, 0.25))
-            writer.kill()
-            acknowledged += map(int, (lines + writer.stdout.read()).split())
-        torn += any((path / "staging").glob("*/*.partial"))
-        with Store.open(path) as store:
-            assert list((path / "staging").iterdir()) == []
-            assert run_directories(store) == {summary.key for summary in store.summaries()}
-            assert all(store.contains(run_key(numbered_run(number).scene)) for number in acknowledged)
+    with start(KILL_WRITERS, path) as killer:
+        printed = killer.communicate()[0]
+    assert killer.returncode == 0
+    torn, *acknowledged = map(int, printed.split())
     assert len(acknowledged) >= 20
     assert torn > 0, "no writer was killed in the middle of a run"
     with Store.existing(path) as store:
