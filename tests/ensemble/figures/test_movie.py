@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from ensemble.figures import movie
 from ensemble.figures.movie import Picture, picture_times, save_movie
 from solver.analysis.run import Frames, Run
 from solver.membrane.curve import positions
@@ -55,14 +56,20 @@ def _shown(image: Image.Image, index: int) -> float:
     return float(image.info["duration"])
 
 
-@pytest.mark.parametrize(("suffix", "size"), [(".mp4", (720, 1280)), (".gif", (360, 640))])
+FORMATS = pytest.mark.parametrize(("suffix", "size"), [(".mp4", (720, 1280)), (".gif", (360, 640))])
+
+
+@FORMATS
 def test_the_pictures_of_a_file_show_the_membranes_where_they_are(
-    tmp_path: Path, suffix: str, size: tuple[int, int]
+    tmp_path: Path, suffix: str, size: tuple[int, int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    # A movie of a few pictures: their number is what takes time.
+    monkeypatch.setattr(movie, "_DURATION", (0.4, 20.0))
+    monkeypatch.setattr(movie, "_HOLD", 0.1)
     run, path = few_frames(orbit()), tmp_path / f"run{suffix}"
     save_movie(run, path)
     assert list(tmp_path.iterdir()) == [path]
-    assert duration(path) == pytest.approx(5.0 + HOLD, abs=0.2)
+    assert duration(path) == pytest.approx(0.4 + 0.1, abs=0.2)
     pictures = list(decoded(path))
     assert pictures[0].shape == (*size, 3)
 
@@ -75,6 +82,17 @@ def test_the_pictures_of_a_file_show_the_membranes_where_they_are(
         assert brightness(shown, picture, inside).min() > 220
     changed = np.abs(pictures[0].astype(int) - pictures[-1]).max(axis=2) > 40
     assert changed.mean() > 0.002
+
+
+@pytest.mark.long
+@FORMATS
+def test_a_movie_lasts_as_long_as_it_should(tmp_path: Path, suffix: str, size: tuple[int, int]) -> None:
+    path = tmp_path / f"run{suffix}"
+    save_movie(few_frames(orbit()), path)
+    assert duration(path) == pytest.approx(5.0 + HOLD, abs=0.2)
+    pictures = list(decoded(path))
+    assert len(pictures) > 90
+    assert pictures[-1].shape == (*size, 3)
 
 
 def brightness(shown: np.ndarray, picture: Picture, points: np.ndarray) -> np.ndarray:

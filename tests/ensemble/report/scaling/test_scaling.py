@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import importlib.util
+import json
 import math
 import sys
+from dataclasses import asdict
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import ensemble
+import solver
 from ensemble.config.documents import load_scene
 from ensemble.figures import save
 from ensemble.mpi.scaling_model import LEAST_EFFICIENCY, MEASURED, ScalingModel, recommended_ranks
@@ -25,10 +31,11 @@ from ensemble.report.scaling.scaling_fit import (
     recommend_ranks,
     summation_crossover,
 )
-from ensemble.report.scaling.scaling_plan import FULL, POINTS, QUICK, suspension
+from ensemble.report.scaling.scaling_plan import FULL, POINTS, QUICK, ScalingPlan, suspension
 from ensemble.report.scaling.scaling_text import scaling_text
-from ensemble.report.scaling.time_shares import PARTS, time_shares
+from ensemble.report.scaling.time_shares import _PART_OF_FOLDER, _PART_OF_MODULE, PARTS, time_shares
 from solver.parallel import SERIAL
+from tests.conftest import Launcher
 
 KNOWN = ScalingModel(
     pair=3e-8,
@@ -125,6 +132,15 @@ def test_what_is_gathered_is_counted():
     assert (counted.gathers, counted.seconds) == (0, 0.0)
 
 
+def test_every_module_and_folder_of_a_part_exists() -> None:
+    names = {
+        path.stem for package in (solver, ensemble) for path in Path(package.__file__).parent.rglob("*.py")
+    }
+    assert names >= _PART_OF_MODULE.keys()
+    for folder in _PART_OF_FOLDER:
+        assert importlib.util.find_spec(folder if folder == "scipy" else f"solver.{folder}")
+
+
 def test_the_parts_of_an_evaluation_are_its_whole_time():
     shares = time_shares(lambda: CountingRanks(SERIAL).divide(3).gather(np.zeros((3, 2))))
     assert shares.keys() == set(PARTS)
@@ -141,14 +157,14 @@ def test_plans_reach_from_a_pair_to_many(plan):
 
 
 MEASURING = """
-import sys
+import json, sys
 from pathlib import Path
 from ensemble.mpi.world import abort_guard, world
 from ensemble.report.scaling.make_scaling import measure_scaling
 from ensemble.report.scaling.scaling_plan import ScalingPlan
 communicator = world()
 with abort_guard(communicator):
-    plan = ScalingPlan(shared=(2, 8), single=(2, 8, 12), weak=8, repeats=1)
+    plan = ScalingPlan(**json.loads(sys.argv[2]))
     document = measure_scaling(communicator, plan, lambda line: None)
     assert (document is None) == (communicator.Get_rank() > 0)
     if document is not None:
@@ -156,12 +172,48 @@ with abort_guard(communicator):
 """
 
 
-def test_evaluations_are_measured_on_real_ranks_and_written(launcher, tmp_path):
-    """More ranks than the machine has cores, perhaps: then the times are those of a crowd."""
-    file = tmp_path / "scaling.json"
-    result = launcher.run(3, [sys.executable, "-c", MEASURING, str(file)])
+def measured(launcher: Launcher, ranks: int, plan: ScalingPlan, directory: Path) -> Scaling:
+    """The report that real ranks measure.
+
+    There may be more ranks than the machine has cores, and the times those of a crowd.
+    """
+    file = directory / "scaling.json"
+    result = launcher.run(ranks, [sys.executable, "-c", MEASURING, str(file), json.dumps(asdict(plan))])
     assert result.returncode == 0, result.stderr
-    report = Scaling.model_validate_json(file.read_text())
+    return Scaling.model_validate_json(file.read_text())
+
+
+def assert_drawn_and_written(report: Scaling, directory: Path) -> None:
+    """Figures and text show what the report holds."""
+    figures = scaling_figures(report)
+    assert figures.keys() == {"efficiency", "parts", "cost"}
+    for name, figure in figures.items():
+        save(figure, directory / f"{name}.png")
+        assert (directory / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+    text = scaling_text(report, ["cost.png"])
+    assert "![cost.png](cost.png)" in text
+    assert f"{report.crossover.pairs_a_point:.0f} pairs of the direct sum" in text
+    for point in report.evaluations:
+        assert f"{point.seconds:.4g}" in text
+
+
+def test_an_evaluation_is_measured_on_a_single_rank(launcher: Launcher, tmp_path: Path) -> None:
+    report = measured(launcher, 1, ScalingPlan(shared=(8,), single=(8, 10), weak=8, repeats=1), tmp_path)
+    (point,) = report.evaluations
+    assert (point.vesicles, point.ranks, point.difference) == (8, 1, 0.0)
+    assert point.seconds > 0
+    assert point.predicted is not None
+    assert point.kernels > point.collectives
+    assert point.kernels + point.collectives + point.solves + point.other == pytest.approx(1.0)
+    assert report.collectives == []
+    assert report.crossover.pair_seconds > 0
+    assert all(cost.sums > 1 for cost in report.costs)
+    assert_drawn_and_written(report, tmp_path)
+
+
+@pytest.mark.long
+def test_evaluations_are_measured_on_several_ranks(launcher: Launcher, tmp_path: Path) -> None:
+    report = measured(launcher, 3, ScalingPlan(shared=(2, 8), single=(2, 8, 12), weak=8, repeats=1), tmp_path)
     assert [(point.vesicles, point.ranks) for point in report.evaluations] == [
         (vesicles, ranks) for vesicles in (2, 8) for ranks in (1, 2, 3)
     ]
@@ -176,16 +228,5 @@ def test_evaluations_are_measured_on_real_ranks_and_written(launcher, tmp_path):
     assert [cost.vesicles for cost in report.costs] == [2, 8, 12]
     memory = [cost.peak_memory_bytes for cost in report.costs]
     assert memory == sorted(memory)
-
-    figures = scaling_figures(report)
-    assert figures.keys() == {"efficiency", "parts", "cost"}
-    for name, figure in figures.items():
-        save(figure, tmp_path / f"{name}.png")
-        assert (tmp_path / f"{name}.png").read_bytes().startswith(b"\x89PNG")
-    text = scaling_text(report, ["cost.png"])
-    assert "![cost.png](cost.png)" in text
-    assert f"{report.crossover.pairs_a_point:.0f} pairs of the direct sum" in text
-    assert report.crossover.pair_seconds > 0
     assert all(cost.sums > 1 for cost in report.costs[1:])
-    for point in report.evaluations:
-        assert f"{point.seconds:.4g}" in text
+    assert_drawn_and_written(report, tmp_path)

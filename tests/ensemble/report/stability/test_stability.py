@@ -10,8 +10,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ensemble.report.stability import make_stability as make_stability_module
 from ensemble.report.stability.extreme_scenes import EXTREME_SCENES
-from ensemble.report.stability.make_stability import energy_rise, judge, judge_scenes, quick_groups
+from ensemble.report.stability.make_stability import (
+    energy_rise,
+    judge,
+    judge_scenes,
+    make_stability,
+    quick_groups,
+)
 from ensemble.report.stability.stability_document import Stability, StabilityVerdict
 from ensemble.report.timed_runs import TimedRuns
 from ensemble.store import Store
@@ -99,6 +106,32 @@ def test_a_scene_that_raises_does_not_hide_the_others(store):
     assert rows[2].smallest_step == store.summary(rows[2].run_key).work.smallest_step
 
 
+def assert_written(directory: Path, document: Stability) -> None:
+    """The files of a report are there, and hold it."""
+    names = {file.name for file in directory.iterdir()}
+    assert names == {"report.md", "report.json", "scenes.png", "scenes.svg"}
+    assert Stability.model_validate_json((directory / "report.json").read_text()) == document
+    assert (directory / "scenes.png").read_bytes().startswith(b"\x89PNG")
+    assert all(row.scene in (directory / "report.md").read_text() for row in document.rows)
+
+
+def test_a_report_is_written_into_the_store_and_resumes(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = Scene(horizon=2.0, vesicles=(Vesicle(),), numerics=Numerics(points=32, tolerance=1e-3))
+    in_trap = scene.model_copy(update={"flow": Trap(rate=0.1)})
+    groups = {"at rest": {"one vesicle": scene, "not in a quick report": in_trap}, "flow": {"trap": in_trap}}
+    monkeypatch.setattr(make_stability_module, "EXTREME_SCENES", groups)
+    lines: list[str] = []
+    report = make_stability(store, quick=True, log=lines.append)
+    assert lines == ["at rest: one vesicle", "flow: trap"]
+    assert report.directory == store.path / "reports" / "stability"
+    assert_written(report.directory, report.document)
+    assert make_stability(store, quick=True, log=lines.append).document == report.document
+    assert len(lines) == 2
+
+
+@pytest.mark.long
 def test_the_command_writes_a_report_into_the_store_and_resumes(ensemble, tmp_path):
     command = ("report", "stability", "--quick", "--store", str(tmp_path / "store"), "--json")
     first = ensemble(*command)
@@ -109,17 +142,7 @@ def test_the_command_writes_a_report_into_the_store_and_resumes(ensemble, tmp_pa
     assert [row.scene for row in document.rows] == names
     assert [line.partition(": ")[2] for line in first.stderr.splitlines()] == names
     assert all(row.evaluations <= 3_500 for row in document.rows)
-
-    directory = tmp_path / "store" / "reports" / "stability"
-    assert {file.name for file in directory.iterdir()} == {
-        "report.md",
-        "report.json",
-        "scenes.png",
-        "scenes.svg",
-    }
-    assert Stability.model_validate_json((directory / "report.json").read_text()) == document
-    assert (directory / "scenes.png").read_bytes().startswith(b"\x89PNG")
-    assert all(name in (directory / "report.md").read_text() for name in names)
+    assert_written(tmp_path / "store" / "reports" / "stability", document)
 
     again = ensemble(*command)
     assert again.stderr == ""
