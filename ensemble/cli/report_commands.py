@@ -61,12 +61,12 @@ def _paper(only: list[str], quick: bool, store: Path, ranks_per_run: str | None)
     from rich.console import Console
 
     from ensemble.config.documents import load_scene
+    from ensemble.display.progress import report_progress
     from ensemble.mpi.groups import chosen_ranks
     from ensemble.mpi.store_on_ranks import store_on_ranks
     from ensemble.mpi.world import abort_guard, world
     from ensemble.report.paper.make_paper import make_paper
     from ensemble.report.paper.sections import sections_named
-    from ensemble.report.report_progress import report_progress
 
     with refusing():
         sections = sections_named(only)
@@ -74,26 +74,26 @@ def _paper(only: list[str], quick: bool, store: Path, ranks_per_run: str | None)
     with abort_guard(communicator):
         # Its scenes have one vesicle or two.
         ranks = chosen_ranks(ranks_per_run or "1", load_scene("doublet-shear"), communicator.Get_size())
-        with store_on_ranks(communicator, store) as opened, report_progress(Console(stderr=True)) as tell:
-            return make_paper(communicator, opened, sections, quick, tell, ranks)
+        with store_on_ranks(communicator, store) as opened, report_progress(Console(stderr=True)) as log:
+            return make_paper(communicator, opened, sections, quick, log, ranks)
 
 
 def _scaling(quick: bool, store: Path) -> FinishedReport | None:
     """Make the report on scaling on all ranks; None on all but the first."""
     from rich.console import Console
 
+    from ensemble.display.progress import report_progress
     from ensemble.mpi.store_on_ranks import store_on_ranks
     from ensemble.mpi.world import abort_guard, world
-    from ensemble.report.report_progress import report_progress
     from ensemble.report.scaling.make_scaling import make_scaling
 
     communicator = world()
     with (
         abort_guard(communicator),
         store_on_ranks(communicator, store) as opened,
-        report_progress(Console(stderr=True)) as tell,
+        report_progress(Console(stderr=True)) as log,
     ):
-        return make_scaling(communicator, opened, quick, tell)
+        return make_scaling(communicator, opened, quick, log)
 
 
 def _measurements(name: ReportName, quick: bool, store: Path) -> FinishedReport | None:
@@ -102,7 +102,7 @@ def _measurements(name: ReportName, quick: bool, store: Path) -> FinishedReport 
         return None
     from rich.console import Console
 
-    from ensemble.report.report_progress import report_progress
+    from ensemble.display.progress import report_progress
     from ensemble.report.stability.make_stability import make_stability
     from ensemble.report.work_precision.make_work_precision import make_work_precision
 

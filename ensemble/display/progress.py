@@ -1,4 +1,4 @@
-"""Shows on standard error how far a job or a simulation has come.
+"""Shows on standard error how far a job, a simulation or a report has come.
 
 On a terminal it is a table or a bar that changes in place, elsewhere (a log file, a batch job) plain lines.
 For a program that has started this one, it is a line of JSON now and then.
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console, Group
 from rich.live import Live
-from rich.progress import Progress
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 from rich.text import Text
 
@@ -180,6 +180,32 @@ def progress_text(progress: JobProgress[Any]) -> str:
 def _print_line(console: Console, fraction: float, message: str) -> None:
     line = ProgressLine(fraction=fraction, message=message)
     console.print(line.model_dump_json(), soft_wrap=True, highlight=False, markup=False)
+
+
+@contextmanager
+def report_progress(console: Console) -> Iterator[Callable[[str], None]]:
+    """Give a function that shows a line about every run: a live line on a terminal, plain lines elsewhere.
+
+    Parameters
+    ----------
+    console : Console
+
+    Yields
+    ------
+    callable
+        Takes a line of text.
+    """
+    if not console.is_terminal:
+        yield lambda line: console.print(line, soft_wrap=True, highlight=False, markup=False)
+        return
+    columns = (
+        BarColumn(pulse_style="cyan"),
+        TextColumn("{task.description}", markup=False),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=console, transient=True) as progress:
+        task = progress.add_task("", total=None)
+        yield lambda line: progress.update(task, description=line)
 
 
 def _table(snapshot: Snapshot) -> Table:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from ensemble.config.run_key import run_key
-from ensemble.report.report_progress import Tell
 from ensemble.store import Store
 from ensemble.store.run_record import RunSummary
 from solver.analysis.run import Run
@@ -24,7 +25,7 @@ class TimedRuns:
         Called with one line of text before each run that is made.
     """
 
-    def __init__(self, store: Store, log: Tell) -> None:
+    def __init__(self, store: Store, log: Callable[[str], None]) -> None:
         self._store = store
         self._log = log
         self._warm: set[tuple[object, ...]] = set()

@@ -19,7 +19,6 @@ from ensemble.report.paper.results import Results
 from ensemble.report.paper.section import Section, SectionContent, SectionFigure, SectionPlan
 from ensemble.report.report_files import FinishedReport, report_directory, write_report
 from ensemble.report.report_model import Machine
-from ensemble.report.report_progress import Tell
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
@@ -32,7 +31,7 @@ def make_paper(
     store: StoreOnRank,
     sections: Sequence[Section],
     quick: bool,
-    log: Tell,
+    log: Callable[[str], None],
     ranks_per_run: int = 1,
 ) -> FinishedReport | None:
     """Make the runs that the store does not have, then write ``reports/paper/`` in the store.
@@ -125,7 +124,11 @@ class _SectionGenerators:
 
 
 def _make_runs(
-    communicator: Intracomm, plan: SectionPlan, store: StoreOnRank, log: Tell, ranks_per_run: int
+    communicator: Intracomm,
+    plan: SectionPlan,
+    store: StoreOnRank,
+    log: Callable[[str], None],
+    ranks_per_run: int,
 ) -> int:
     """Make the runs of a plan on all ranks, and return how many they are."""
     usage = run_batch(
@@ -142,7 +145,7 @@ def _make_runs(
     return runs
 
 
-def _progress_logger(name: str, log: Tell) -> Callable[[Snapshot], None]:
+def _progress_logger(name: str, log: Callable[[str], None]) -> Callable[[Snapshot], None]:
     return lambda snapshot: log(f"{name}: {progress_text(snapshot.progress)}")
 
 

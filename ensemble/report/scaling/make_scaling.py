@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +14,6 @@ from ensemble.mpi.store_on_ranks import whole_store
 from ensemble.report import ReportName
 from ensemble.report.report_files import FinishedReport, report_directory, write_report
 from ensemble.report.report_model import Machine
-from ensemble.report.report_progress import Tell
 from ensemble.report.scaling.scaling_document import (
     CollectiveTime,
     EvaluationCost,
@@ -50,7 +50,7 @@ _ROUNDS = 3  # in which the numbers of ranks take turns, because a machine's spe
 
 
 def make_scaling(
-    communicator: Intracomm, store: StoreOnRank, quick: bool, log: Tell
+    communicator: Intracomm, store: StoreOnRank, quick: bool, log: Callable[[str], None]
 ) -> FinishedReport | None:
     """Measure on 1, 2, 4, … and all ranks, then write ``reports/scaling/`` in the store.
 
@@ -82,7 +82,7 @@ def make_scaling(
     return report
 
 
-def measure_scaling(communicator: Intracomm, plan: ScalingPlan, log: Tell) -> Scaling | None:
+def measure_scaling(communicator: Intracomm, plan: ScalingPlan, log: Callable[[str], None]) -> Scaling | None:
     """Measure everything that a plan names, and fit the scaling model.
 
     Collective.
@@ -152,7 +152,9 @@ def _numbers_of_ranks(available: int) -> list[int]:
     return sorted({2**power for power in range(available.bit_length())} | {available})
 
 
-def _measure_costs(communicator: Intracomm, plan: ScalingPlan, log: Tell) -> list[EvaluationCost]:
+def _measure_costs(
+    communicator: Intracomm, plan: ScalingPlan, log: Callable[[str], None]
+) -> list[EvaluationCost]:
     costs = []
     for vesicles in plan.single:
         log(f"{vesicles} vesicles on one rank")
@@ -171,7 +173,7 @@ def _measure_costs(communicator: Intracomm, plan: ScalingPlan, log: Tell) -> lis
 
 
 def _measure_shared(
-    communicator: Intracomm, vesicles: int, sizes: list[int], repeats: int, log: Tell
+    communicator: Intracomm, vesicles: int, sizes: list[int], repeats: int, log: Callable[[str], None]
 ) -> list[SharedEvaluation]:
     fastest: dict[int, EvaluationMeasurement] = {}
     for _ in range(_ROUNDS):
@@ -198,7 +200,7 @@ def _measure_shared(
 
 
 def _measure_weak(
-    communicator: Intracomm, plan: ScalingPlan, sizes: list[int], log: Tell
+    communicator: Intracomm, plan: ScalingPlan, sizes: list[int], log: Callable[[str], None]
 ) -> list[WeakScaling]:
     measured: list[WeakScaling] = []
     for ranks in sizes:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -11,7 +11,6 @@ from ensemble.config.run_key import run_key
 from ensemble.report import ReportName
 from ensemble.report.report_files import FinishedReport, report_directory, write_report
 from ensemble.report.report_model import Machine
-from ensemble.report.report_progress import Tell
 from ensemble.report.stability.extreme_scenes import EXTREME_SCENES
 from ensemble.report.stability.stability_document import (
     CRITERIA,
@@ -33,7 +32,7 @@ QUICK_WORK_LIMIT = 3_000  # evaluations of the right-hand side
 SceneGroups = Mapping[str, Mapping[str, Scene]]
 
 
-def make_stability(store: Store, quick: bool, log: Tell) -> FinishedReport:
+def make_stability(store: Store, quick: bool, log: Callable[[str], None]) -> FinishedReport:
     """Make the runs that the store does not have, then write ``reports/stability/`` in the store.
 
     The files are ``report.md``, ``report.json`` and the figure, as PNG and as SVG; each appears complete or

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from ensemble.report import ReportName
 from ensemble.report.report_files import FinishedReport, report_directory, write_report
 from ensemble.report.report_model import Machine
-from ensemble.report.report_progress import Tell
 from ensemble.report.timed_runs import TimedRuns
 from ensemble.report.work_precision.doublet_answers import critical_brackets, doublet_answers
 from ensemble.report.work_precision.least_times import least_times
@@ -22,7 +21,7 @@ from ensemble.store import Store
 from solver.scene import Scene
 
 
-def make_work_precision(store: Store, quick: bool, log: Tell) -> FinishedReport:
+def make_work_precision(store: Store, quick: bool, log: Callable[[str], None]) -> FinishedReport:
     """Make the runs that the store does not have, then write ``reports/work-precision/`` in the store.
 
     The files are ``report.md``, ``report.json`` and the figures, as PNG and as SVG; each appears complete or
