@@ -110,6 +110,10 @@ def may_tumble(scene: Scene) -> bool:
     Parameters
     ----------
     scene : Scene
+
+    Returns
+    -------
+    bool
     """
     rotates = scene.flow is not None and scene.flow.rotates
     return len(scene.vesicles) == 1 and rotates and scene.vesicles[0].reduced_area < 1

@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 class History:
     """The run up to the end of its last step.
 
-    Parameters
+    Attributes
     ----------
     time : float
         End of the last step.
@@ -65,6 +65,10 @@ class Criterion(ABC):
         Parameters
         ----------
         scene : Scene
+
+        Returns
+        -------
+        bool
         """
 
     @abstractmethod
@@ -76,4 +80,8 @@ class Criterion(ABC):
         Parameters
         ----------
         history : History
+
+        Returns
+        -------
+        Outcome or None
         """

@@ -10,10 +10,14 @@ from solver.scene import Scene
 
 
 class Revolved(Criterion):
-    """The line of centers has made ``revolutions`` full turns, and the gap has stopped to grow.
+    """The line of centers has made ``revolutions`` full turns, and the gap no longer grows.
 
     A pair slides open once in every half turn.  The gap's maximum in the last half turn must not exceed that
     in the one before by more than the fraction ``gap_growth``.
+
+    Parameters
+    ----------
+    scene : Scene
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -27,6 +31,10 @@ class Revolved(Criterion):
         Parameters
         ----------
         scene : Scene
+
+        Returns
+        -------
+        bool
         """
         return len(scene.vesicles) == 2 and scene.flow is not None and scene.flow.rotates
 
@@ -36,6 +44,10 @@ class Revolved(Criterion):
         Parameters
         ----------
         history : History
+
+        Returns
+        -------
+        Outcome or None
         """
         assert history.line_of_centers
         half_turns = history.line_of_centers.half_turns

@@ -17,6 +17,10 @@ class Separated(Criterion):
         Parameters
         ----------
         scene : Scene
+
+        Returns
+        -------
+        bool
         """
         return len(scene.vesicles) == 2
 
@@ -26,6 +30,10 @@ class Separated(Criterion):
         Parameters
         ----------
         history : History
+
+        Returns
+        -------
+        Outcome or None
         """
         assert history.line_of_centers
         return Outcome.SEPARATED if history.line_of_centers.separated else None

@@ -25,6 +25,10 @@ class Steady(Criterion):
         Parameters
         ----------
         scene : Scene
+
+        Returns
+        -------
+        bool
         """
         return not Revolved.applies_to(scene)
 
@@ -34,6 +38,10 @@ class Steady(Criterion):
         Parameters
         ----------
         history : History
+
+        Returns
+        -------
+        Outcome or None
         """
         if not self._at_rest(history):
             return None

@@ -18,6 +18,10 @@ class Tumbled(Criterion):
         Parameters
         ----------
         scene : Scene
+
+        Returns
+        -------
+        bool
         """
         return may_tumble(scene)
 
@@ -27,6 +31,10 @@ class Tumbled(Criterion):
         Parameters
         ----------
         history : History
+
+        Returns
+        -------
+        Outcome or None
         """
         assert history.long_axis
         half_turns = len(history.long_axis.half_turns) - 1
