@@ -1,0 +1,99 @@
+"""`ensemble/README.md` is true: its Python and its study run, its commands and folders exist."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import typer
+
+import ensemble
+from ensemble.cli.main import app
+from ensemble.config.documents import preset_names
+from ensemble.config.study import Study
+from ensemble.report.paper.results import Results
+from ensemble.store import Store
+from solver import Outcome, simulate
+from solver.membrane.curve import positions
+
+FOLDER = Path(ensemble.__file__).parent
+README = (FOLDER / "README.md").read_text(encoding="utf-8")
+
+
+def blocks(language: str) -> list[str]:
+    """Fenced blocks of a language, in their order."""
+    return re.findall(rf"^```{language}\n(.*?)^```$", README, re.MULTILINE | re.DOTALL)
+
+
+@pytest.fixture(scope="module")
+def namespace(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """What all Python of the README has defined, run in one directory from top to bottom."""
+    names: dict[str, Any] = {"__name__": "readme"}
+    with pytest.MonkeyPatch.context() as patch:
+        directory = tmp_path_factory.mktemp("readme")
+        patch.chdir(directory)
+        for block in blocks("python"):
+            exec(compile(block, "ensemble/README.md", "exec"), names)
+    return names | {"directory": directory}
+
+
+def test_the_membranes_of_the_snippet_are_those_of_the_run(namespace: dict[str, Any]) -> None:
+    directory = namespace["directory"]
+    with Store.existing(directory / "ensemble-store") as store:
+        run = store.load(namespace["key"])
+    frames = run.frames
+    assert len(frames.time) == 4
+    exact = positions(frames.tangent_angle, frames.center, [vesicle.length for vesicle in run.scene.vesicles])
+    for frame in range(4):
+        for vesicle in range(2):
+            drawn = namespace["membrane"](frame, vesicle)
+            np.testing.assert_allclose(drawn, exact[frame, vesicle], atol=1e-12)
+    assert (directory / "membranes.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_section_compares_what_it_asks_for(namespace: dict[str, Any], tmp_path: Path) -> None:
+    generator = namespace["SECTION"].generate(True)
+    (case,) = next(generator).cases
+    with Store.open(tmp_path / "store") as store:
+        store.save(simulate(case.scene))
+        with pytest.raises(StopIteration) as finished:
+            generator.send(Results(store))
+    _, (comparison,) = finished.value.value.blocks
+    assert comparison.agrees is True
+    assert comparison.runs == [case.key]
+
+
+def test_the_study_is_valid() -> None:
+    (text,) = blocks("toml")
+    study = Study.model_validate(tomllib.loads(text))
+    assert study.scene_at(0.8, 2.0).vesicles[0].reduced_area == 0.8
+    assert study.search.low == (Outcome.BOUND,)
+
+
+def test_commands_and_their_options_exist() -> None:
+    commands = typer.main.get_command(app).commands
+    lines = [line for block in blocks("sh") for line in block.splitlines()]
+    lines += re.findall(r"`((?:mpirun -n \d+ )?ensemble [^`]*)`", README)
+    assert len(lines) > 15
+    for line in lines:
+        _, *words = shlex.split(line[line.index("ensemble ") :], comments=True)
+        name, options = words[0], [word for word in words if word.startswith("--")]
+        known = {option for parameter in commands[name].params for option in parameter.opts}
+        assert known.issuperset(options), line
+
+
+def test_all_presets_are_listed() -> None:
+    section = README.partition("## Studies and scenes")[2].partition("**To write a study**")[0]
+    assert set(preset_names()) <= set(re.findall(r"`([a-z-]+)`", section))
+
+
+def test_all_folders_are_listed() -> None:
+    listed = re.findall(r"`(\w+)/`", README.partition("## The folders")[2].partition("**To add")[0])
+    there = {path.parent.name for path in FOLDER.glob("*/__init__.py")}
+    assert set(listed) == there
+    assert len(listed) == len(there)
