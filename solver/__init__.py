@@ -4,17 +4,18 @@ The package knows no files, no database and no MPI.  `Scene` describes what is s
 and returns a `Run`.  `README.md` beside this file states the method.
 """
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from solver.analysis.run import Energy, Errors, Frames, Outcome, Run, Series, Viscosity, Work
-from solver.revision import RESULTS_REVISION
-from solver.scene import Scene
-
 if TYPE_CHECKING:
-    from solver.simulation.simulate import simulate
+    from solver.analysis.run import Energy, Errors, Frames, Outcome, Run, Series, Viscosity, Work
+    from solver.revision import RESULTS_REVISION
+    from solver.scene import Scene
+    from solver.simulation.simulate import Cancelled, simulate
 
 __all__ = [
     "RESULTS_REVISION",
+    "Cancelled",
     "Energy",
     "Errors",
     "Frames",
@@ -27,11 +28,21 @@ __all__ = [
     "simulate",
 ]
 
+_MODULES = {
+    "RESULTS_REVISION": "solver.revision",
+    "Cancelled": "solver.simulation.simulate",
+    "Scene": "solver.scene",
+    "simulate": "solver.simulation.simulate",
+}  # of the others: that of results
+
 
 def __getattr__(name: str) -> Any:
-    # The compiled kernels take seconds to load: only those who simulate wait for them.
-    if name == "simulate":
-        from solver.simulation.simulate import simulate
+    # Names load their modules when they are used: the compiled kernels take seconds, and only those who
+    # simulate wait for them.
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_MODULES.get(name, "solver.analysis.run")), name)
 
-        return simulate
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+def __dir__() -> list[str]:
+    return [*globals(), *__all__]

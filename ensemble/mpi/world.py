@@ -35,7 +35,9 @@ _FORWARD_SECONDS = 0.3
 def pin_threads() -> None:
     """Give BLAS and Numba one thread in this process, unless the environment already says otherwise.
 
-    The libraries read these variables when they are loaded, so this comes before the first import of NumPy.
+    `simulate` limits BLAS by itself.  These variables, which the libraries read when they are loaded, spare
+    each rank the threads that BLAS would start, one for each processor, and keep idle.  Child processes
+    inherit them.  This comes before the first import of NumPy.
     """
     for variable in _THREAD_VARIABLES:
         os.environ.setdefault(variable, "1")

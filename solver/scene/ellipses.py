@@ -177,10 +177,10 @@ def overlapping_pair(vesicles: tuple[Vesicle, ...]) -> tuple[int, int] | None:
     (int, int) or None
         None if all are apart.
     """
-    from scipy.spatial import cKDTree  # for the reason that `solver.membrane.shapes` gives
-
     if len(vesicles) < 2:
         return None
+    from scipy.spatial import cKDTree  # for the reason that `solver.membrane.shapes` gives
+
     ellipses = Ellipses.of(vesicles)
     centers = np.stack([ellipses.center.real, ellipses.center.imag], axis=1)
     pairs = cKDTree(centers).query_pairs(2 * float(ellipses.major.max()), output_type="ndarray")

@@ -234,6 +234,22 @@ def test_the_exit_status_tells_that_a_search_did_not_converge(ensemble, tmp_path
     assert point["critical_value"] is None
 
 
+def test_a_run_that_fails_at_its_start_is_an_outcome(ensemble, tmp_path):
+    slender = ["--set=vesicles.reduced_area=0.03", f"--store={tmp_path / 'store'}"]
+    result = ensemble("run", "vesicle-shear", *slender, "--json")
+    assert result.returncode == 1, result.stderr
+    document = json.loads(result.stdout, parse_constant=pytest.fail)
+    assert set(document) == RUN_FIELDS
+    assert document["outcome"] == "failed"
+    assert "64 points do not resolve the scene" in document["failure"]
+    assert document["time"] == 0.0
+    assert document["error"]["spatial"] > 1e-3
+    picture = tmp_path / "start.svg"
+    shown = ensemble("show", document["run_key"], f"--store={tmp_path / 'store'}", f"--output={picture}")
+    assert shown.returncode == 0, shown.stderr
+    assert picture.stat().st_size > 0
+
+
 def test_query_finds_what_meets_the_conditions(ensemble, finished_study):
     store = f"--store={finished_study.store}"
     every = json.loads(ensemble("query", "runs", store, "--json").stdout)
