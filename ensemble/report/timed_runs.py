@@ -75,9 +75,9 @@ class TimedRuns:
     def _warm_up(self, scene: Scene) -> None:
         """Compile and fill caches once for each kind of scene; else the first run would include that time."""
         flow = type(scene.flow)
-        exponents = None if scene.adhesion is None else scene.adhesion.exponents
+        formula = None if scene.adhesion is None else scene.adhesion.formula
         numerics = scene.numerics
-        kind = (len(scene.vesicles), flow, exponents, numerics.points, numerics.integrator)
+        kind = (len(scene.vesicles), flow, formula, numerics.points, numerics.integrator)
         if kind not in self._warm:
             brief = numerics.model_copy(update={"work_limit": _WARM_UP})
             simulate(scene.model_copy(update={"numerics": brief, "start": Start()}))

@@ -1,21 +1,24 @@
 """Adhesion between the membranes of different vesicles.
 
-The pair potential φ(r) = H[(δ/r)^m − (m/n)(δ/r)^n] (paper, eq. 2) gives the force density
-f(x) = −∇ ∫ φ ds_y = H m ∫ (x−y)/r² [(δ/r)^m − (δ/r)^n] ds_y: repulsive for r < δ.  (The printed equation 3
-has the opposite sign.)
+A pair potential φ of any two points gives the energy ½∫∫ φ ds ds over all pairs of vesicles and the force
+density f(x) = −∇ ∫ φ ds_y over the other vesicles (Quaife et al. 2019, eq. 3 and appendix B, where the sign
+is the opposite).  Integrals are sums by the trapezoid rule, over refined points of a vesicle where a target
+is close to it.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from solver import scene
-from solver.forces.adhesion_sums import AnyPotential, add_density, fill_hessian, summed_energy
-from solver.forces.power_law import Potential
-from solver.membrane.geometry import Geometry
+from solver.forces.pair_formulas import formula_and_parameters
+from solver.forces.pair_sums import add_density, add_stiffness, fill_hessian, summed_energy
+from solver.membrane.geometry import Geometry, Membranes
+from solver.membrane.spectral import interpolations
+from solver.pair_potentials import PairPotential
+from solver.pair_potentials.cutoff import switch_error
 from solver.parallel import SERIAL, Parallel, Shares
 from solver.potentials.proximity import Proximity
 from solver.potentials.quadrature import required_ratio, trapezoid_error
@@ -24,96 +27,330 @@ from solver.potentials.refinement import MAXIMUM_FACTOR, Refinement, sum_costs, 
 Array = NDArray[np.float64]
 
 
-class AdhesionBase:
-    """What all kinds of adhesion have in common: a potential, and how ranks share the points it acts on.
-
-    Parameters
-    ----------
-    parameters : scene.Adhesion
-    accuracy : float
-        Relative error allowed in the force between two nearly parallel membranes.
-    parallel : Parallel
-        The points that the forces act on are shared out among these ranks.
+class InteractionRange(Protocol):
+    """Which sources act on a target, and how finely these are sampled.
 
     Attributes
     ----------
-    ratio : float
+    reach : float
+        Distance over spacing within which targets of a source are looked for.
+    """
+
+    reach: float
+
+    def refinement(self, closeness: Proximity) -> Refinement:
+        """Return the groups of targets and sources.
+
+        Parameters
+        ----------
+        closeness : Proximity
+
+        Returns
+        -------
+        Refinement
+        """
+
+    def sum_error(self, closeness: Proximity) -> float:
+        """Return the relative error of the force between the closest membranes, refined as far as it goes.
+
+        Parameters
+        ----------
+        closeness : Proximity
+
+        Returns
+        -------
+        float
+        """
+
+
+class Everywhere:
+    """All points of other vesicles act on a target.
+
+    Parameters
+    ----------
+    singularity : float
+        `PairPotential.singularity`.
+    accuracy : float
+        Relative error allowed in the force between two nearly parallel membranes.
+
+    Attributes
+    ----------
+    reach : float
         Distance over spacing to which sources are refined for a target.
     """
 
-    def __init__(self, parameters: scene.Adhesion, accuracy: float, parallel: Parallel) -> None:
-        self._parallel = parallel
-        m, n = parameters.exponents
-        self._potential: AnyPotential = Potential(parameters.distance, m, n)
-        self._hamaker = parameters.hamaker
-        self._strength = parameters.hamaker * m  # by which the kernels of the force are multiplied
-        # Over a nearly straight membrane the force kernel is like 1/(s² + d²)^(m/2 + 1).
-        self._order = 0.5 * m + 1
-        self.ratio = required_ratio(self._order, accuracy)
+    def __init__(self, singularity: float, accuracy: float) -> None:
+        self._singularity = singularity
+        self.reach = required_ratio(singularity, accuracy)
+
+    def refinement(self, closeness: Proximity) -> Refinement:
+        """Return the groups of targets and sources; see `InteractionRange`.
+
+        Parameters
+        ----------
+        closeness : Proximity
+
+        Returns
+        -------
+        Refinement
+        """
+        return closeness.refinement(self.reach)
 
     def sum_error(self, closeness: Proximity) -> float:
-        """Relative error of the force between the closest membranes, refined as far as it goes."""
-        return trapezoid_error(self._order, MAXIMUM_FACTOR * min(closeness.nearest, self.ratio))
+        """Return the relative error of the force; see `InteractionRange`.
 
-    def _share(
-        self, geometry: Geometry, refinement: Refinement, curves: int = 0, again: int = 0
-    ) -> tuple[Shares, Refinement]:
-        """How the points are shared out, and this rank's part of a refinement.
+        Parameters
+        ----------
+        closeness : Proximity
 
-        Every point costs sums over so many ``curves`` as they are, and ``again`` one for each of its groups,
-        beside those over refined ones.
+        Returns
+        -------
+        float
         """
-        size = geometry.points[0].size
-        shares = self._parallel.divide(
-            size, lambda: curves + sum_costs(refinement, again + refinement.groups[:, 2].astype(float), size)
-        )
-        return shares, within(refinement, shares.own, size)
-
-    def _total(self, energy: float, geometry: Geometry) -> float:
-        """The energy of all ranks' points and of their images, from φ/H summed over this rank's points."""
-        each = self._parallel.divide(self._parallel.size).gather(np.array([energy]))
-        return float(geometry.membranes.copies * self._hamaker * each.sum())
+        return trapezoid_error(self._singularity, MAXIMUM_FACTOR * min(closeness.nearest, self.reach))
 
 
-class Adhesion(AdhesionBase):
-    """Adhesion over all pairs of a few vesicles; see `AdhesionBase`."""
+class WithinCutoff:
+    """Only points within a cutoff act on a target.
 
-    def __init__(self, parameters: scene.Adhesion, accuracy: float, parallel: Parallel = SERIAL) -> None:
-        super().__init__(parameters, accuracy, parallel)
+    Sources are also refined for the switch, whose fifth derivative jumps.
+
+    Parameters
+    ----------
+    everywhere : Everywhere
+        How sources are refined without a cutoff.
+    distance, cutoff : float
+        Of the `PairPotential`.
+    accuracy : float
+        As for `Everywhere`.
+    membranes : Membranes
+
+    Attributes
+    ----------
+    reach : float
+        See `InteractionRange`.
+    """
+
+    def __init__(
+        self, everywhere: Everywhere, distance: float, cutoff: float, accuracy: float, membranes: Membranes
+    ) -> None:
+        self._everywhere = everywhere
+        spacing = float(membranes.spacing.max())
+        self._least_factor = 1
+        while self._least_factor < MAXIMUM_FACTOR and switch_error(distance, cutoff, spacing) > accuracy:
+            self._least_factor *= 2
+            spacing /= 2
+        self._switch_error = switch_error(distance, cutoff, spacing)
+        # Points of a curve are at most half a spacing nearer to a target than `closeness` says.
+        self._limits = cutoff / membranes.curve_spacing + 0.5
+        self.reach = max(everywhere.reach, float(self._limits.max()))
+
+    def refinement(self, closeness: Proximity) -> Refinement:
+        """Return the groups of targets and sources; see `InteractionRange`.
+
+        Parameters
+        ----------
+        closeness : Proximity
+
+        Returns
+        -------
+        Refinement
+        """
+        refinement = closeness.refinement(self._everywhere.reach, self._limits)
+        groups = refinement.groups.copy()
+        groups[:, 2] = np.maximum(groups[:, 2], self._least_factor)
+        points, largest = refinement.interpolations.shape[1], int(groups[:, 2].max(initial=1))
+        return refinement._replace(groups=groups, interpolations=interpolations(points, largest))
+
+    def sum_error(self, closeness: Proximity) -> float:
+        """Return the relative error of the force; see `InteractionRange`.
+
+        Parameters
+        ----------
+        closeness : Proximity
+
+        Returns
+        -------
+        float
+        """
+        return max(self._everywhere.sum_error(closeness), self._switch_error)
+
+
+class DirectAdhesion:
+    """Adhesion summed over all pairs of points, of a few vesicles, or of many within a cutoff.
+
+    Parameters
+    ----------
+    potential : PairPotential
+    accuracy : float
+        Relative error allowed in the force between two nearly parallel membranes.
+    membranes : Membranes
+    parallel : Parallel
+        The points that the forces act on are shared out among these ranks.
+    """
+
+    def __init__(
+        self,
+        potential: PairPotential,
+        accuracy: float,
+        membranes: Membranes,
+        parallel: Parallel = SERIAL,
+    ) -> None:
+        everywhere = Everywhere(potential.singularity, accuracy)
+        self._range: InteractionRange = everywhere
+        if potential.cutoff is not None:
+            self._range = WithinCutoff(everywhere, potential.distance, potential.cutoff, accuracy, membranes)
+        self._law = formula_and_parameters(potential)
+        self._hamaker = potential.hamaker
+        self._parallel = parallel
+
+    @property
+    def reach(self) -> float:
+        """Distance over spacing within which targets of a source are looked for."""
+        return self._range.reach
 
     def density(self, geometry: Geometry, closeness: Proximity) -> Array:
-        """Force per length, (2, M, N)."""
-        shares, sums = self._sums(geometry, closeness)
+        """Compute the force per length.
+
+        Collective.
+
+        Parameters
+        ----------
+        geometry : Geometry
+        closeness : Proximity
+            Of this geometry, at least to `reach`.
+
+        Returns
+        -------
+        (2, M, N)
+        """
         density = np.zeros_like(geometry.points)
-        add_density(*sums, self._strength, density)
-        return gathered(shares, density)
+        shares, sums = self._sums(geometry, closeness)
+        add_density(*sums, self._hamaker, density)
+        return gather_points(shares, density)
 
     def jacobian(self, geometry: Geometry, closeness: Proximity) -> Array:
-        """Derivative of `density` by the state, (2, M·N, state)."""
+        """Compute the derivative of `density` by the state.
+
+        Collective.
+
+        Parameters
+        ----------
+        geometry : Geometry
+        closeness : Proximity
+            As for `density`.
+
+        Returns
+        -------
+        (2, M·N, state_size)
+        """
         membranes = geometry.membranes
         size = membranes.count * membranes.points
         hessian = np.empty((2, size, 2, membranes.copies * size))
         shares, sums = self._sums(geometry, closeness)
-        fill_hessian(*sums, self._strength, hessian)
+        fill_hessian(*sums, self._hamaker, hessian)
         own = hessian[:, shares.own]
         return shares.gather(geometry.by_state(membranes.fold(own)), axis=1)
 
+    def stiffness(self, geometry: Geometry, closeness: Proximity) -> Array:
+        """Compute the derivative of the density at each point by that point.
+
+        Collective.
+
+        Parameters
+        ----------
+        geometry : Geometry
+        closeness : Proximity
+            As for `density`.
+
+        Returns
+        -------
+        (3, M, N)
+            Its components xx, xy and yy.
+        """
+        stiffness = np.zeros((3, *geometry.points.shape[1:]))
+        shares, sums = self._sums(geometry, closeness)
+        add_stiffness(*sums, self._hamaker, stiffness)
+        return gather_points(shares, stiffness)
+
     def energy(self, geometry: Geometry, closeness: Proximity) -> float:
-        """∫∫ φ ds ds summed over all pairs."""
+        """Compute ½∫∫ φ ds ds over all pairs of vesicles, images included.
+
+        Collective.
+
+        Parameters
+        ----------
+        geometry : Geometry
+        closeness : Proximity
+            As for `density`.
+
+        Returns
+        -------
+        float
+        """
         _, sums = self._sums(geometry, closeness)
-        return self._total(summed_energy(*sums), geometry)
+        return total_energy(self._parallel, geometry, self._hamaker * summed_energy(*sums))
+
+    def sum_error(self, closeness: Proximity) -> float:
+        """Compute the relative error of the force between the closest membranes, refined as far as it goes.
+
+        Parameters
+        ----------
+        closeness : Proximity
+
+        Returns
+        -------
+        float
+        """
+        return self._range.sum_error(closeness)
 
     def _sums(self, geometry: Geometry, closeness: Proximity) -> tuple[Shares, tuple[Any, ...]]:
-        """How the points are shared out, and what the compiled sums over this rank's are given."""
-        refinement = self._refinement(closeness)
-        shares, own = self._share(geometry, refinement)
-        return shares, (geometry.curve_points, geometry.membranes.curve_spacing, own, self._potential)
+        """How the points are shared out, and the arguments of this rank's compiled sums."""
+        refinement = self._range.refinement(closeness)
+        size = geometry.points[0].size
 
-    def _refinement(self, closeness: Proximity) -> Refinement:
-        return closeness.refinement(self.ratio)
+        def costs() -> Array:
+            return sum_costs(refinement, refinement.groups[:, 2].astype(float), size)
+
+        shares = self._parallel.divide(size, costs)
+        own = within(refinement, shares.own, size)
+        return shares, (geometry.curve_points, geometry.membranes.curve_spacing, own, *self._law)
 
 
-def gathered(shares: Shares, values: Array) -> Array:
-    """Values (k, M, N) at all points, of which this rank has found those of its share."""
+def gather_points(shares: Shares, values: Array) -> Array:
+    """Gather values at points of which every rank has computed those of its share.
+
+    Collective.
+
+    Parameters
+    ----------
+    shares : Shares
+        Of the M·N points.
+    values : (k, M, N)
+
+    Returns
+    -------
+    (k, M, N)
+    """
     own = values.reshape(len(values), -1)[:, shares.own]
     return shares.gather(own, axis=1).reshape(values.shape)
+
+
+def total_energy(parallel: Parallel, geometry: Geometry, energy: float) -> float:
+    """Sum the energies of all ranks' points and of their images.
+
+    Collective.
+
+    Parameters
+    ----------
+    parallel : Parallel
+    geometry : Geometry
+    energy : float
+        Of this rank's points.
+
+    Returns
+    -------
+    float
+    """
+    each = parallel.divide(parallel.size).gather(np.array([energy]))
+    return float(geometry.membranes.copies * each.sum())

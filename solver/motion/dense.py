@@ -17,10 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.flows import ImposedFlow
-from solver.forces.adhesion import Adhesion
+from solver.forces.adhesion import DirectAdhesion
 from solver.forces.bending import Bending, bending_of
 from solver.forces.tension import ROUND_OFF, Inextensibility, TensionInverse
-from solver.forces.truncated_adhesion import TruncatedAdhesion
 from solver.membrane.geometry import Geometry, Membranes
 from solver.membrane.spectral import differentiation, highest_modes, integration
 from solver.membrane.symmetry import independent_vesicles
@@ -35,21 +34,9 @@ from solver.parallel import SERIAL, Parallel
 from solver.potentials.proximity import Closeness
 from solver.potentials.single_layer import SingleLayer
 from solver.potentials.viscosity_contrast import ViscosityContrast, contrasts
-from solver.scene import Adhesion as AdhesionParameters
 from solver.scene import Scene
 
 Array = NDArray[np.float64]
-
-
-def _adhesion(
-    parameters: AdhesionParameters | None, accuracy: float, membranes: Membranes, parallel: Parallel
-) -> Adhesion | None:
-    """Make the adhesion that several vesicles have."""
-    if parameters is None:
-        return None
-    if parameters.cutoff is not None:
-        return TruncatedAdhesion(parameters, accuracy, membranes, parallel)
-    return Adhesion(parameters, accuracy, parallel)
 
 
 @dataclass
@@ -60,7 +47,7 @@ class DenseEquation:
     ----------
     membranes : Membranes
     bending : Bending
-    adhesion : Adhesion or None
+    adhesion : DirectAdhesion or None
         None for a scene without, and for a single vesicle.
     flow : ImposedFlow or None
         None in a quiescent fluid.
@@ -77,7 +64,7 @@ class DenseEquation:
 
     membranes: Membranes
     bending: Bending
-    adhesion: Adhesion | None
+    adhesion: DirectAdhesion | None
     flow: ImposedFlow | None
     inextensibility: Inextensibility
     layer: SingleLayer
@@ -103,14 +90,17 @@ class DenseEquation:
         DenseEquation
         """
         membranes = Membranes.of_scene(scene)
+        adhesion = None
         several = membranes.curves > 1
         accuracy = accuracy_of(scene.numerics)
         contrast = contrasts(independent_vesicles(scene))
         differ = bool(np.any(contrast != 1))
+        if scene.adhesion and several:
+            adhesion = DirectAdhesion(scene.adhesion, accuracy, membranes, parallel)
         return cls(
             membranes=membranes,
             bending=bending_of(membranes),
-            adhesion=_adhesion(scene.adhesion, accuracy, membranes, parallel) if several else None,
+            adhesion=adhesion,
             flow=scene.flow,
             inextensibility=Inextensibility(accuracy, 1e-3 * accuracy if several else ROUND_OFF),
             layer=SingleLayer(membranes, accuracy, parallel),

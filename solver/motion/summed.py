@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.flows import ImposedFlow
+from solver.forces.adhesion import DirectAdhesion
 from solver.forces.bending import Bending, bending_of
-from solver.forces.summed_adhesion import SummedAdhesion
+from solver.forces.coarsened_adhesion import CoarsenedAdhesion, adhesion_of_many
 from solver.forces.summed_tension import Preconditioner, SummedInextensibility
 from solver.forces.tension import Inextensibility, TensionInverse, TensionNotFoundError
-from solver.forces.truncated_adhesion import TruncatedAdhesion
 from solver.membrane.geometry import Geometry, Membranes
 from solver.motion.dense import DenseEquation
 from solver.motion.equation import Motion, accuracy_of, conserved_quantities
@@ -22,21 +22,9 @@ from solver.motion.jacobian import BlockDiagonal
 from solver.parallel import Parallel, Shares
 from solver.potentials.neighbors import Neighbors
 from solver.potentials.summed_single_layer import SummedSingleLayer
-from solver.scene import Adhesion as AdhesionParameters
 from solver.scene import Scene
 
 Array = NDArray[np.float64]
-
-
-def _adhesion(
-    parameters: AdhesionParameters | None, accuracy: float, membranes: Membranes, parallel: Parallel
-) -> SummedAdhesion | TruncatedAdhesion | None:
-    """Make the adhesion that many vesicles have."""
-    if parameters is None:
-        return None
-    if parameters.cutoff is not None:
-        return TruncatedAdhesion(parameters, accuracy, membranes, parallel)
-    return SummedAdhesion(parameters, accuracy, parallel)
 
 
 class _Evaluation(NamedTuple):
@@ -60,7 +48,7 @@ class SummedEquation:
         The ranks that compute the terms together.
     membranes : Membranes
     bending : Bending
-    adhesion : SummedAdhesion or TruncatedAdhesion or None
+    adhesion : CoarsenedAdhesion or DirectAdhesion or None
         None for a scene without.
     flow : ImposedFlow or None
         None in a quiescent fluid.
@@ -79,7 +67,7 @@ class SummedEquation:
     parallel: Parallel
     membranes: Membranes
     bending: Bending
-    adhesion: SummedAdhesion | TruncatedAdhesion | None
+    adhesion: CoarsenedAdhesion | DirectAdhesion | None
     flow: ImposedFlow | None
     inextensibility: SummedInextensibility
     layer: SummedSingleLayer
@@ -105,12 +93,15 @@ class SummedEquation:
         """
         membranes = Membranes.of_scene(scene)
         accuracy = accuracy_of(scene.numerics)
+        adhesion = None
+        if scene.adhesion:
+            adhesion = adhesion_of_many(scene.adhesion, accuracy, membranes, parallel)
         return cls(
             scene=scene,
             parallel=parallel,
             membranes=membranes,
             bending=bending_of(membranes),
-            adhesion=_adhesion(scene.adhesion, accuracy, membranes, parallel),
+            adhesion=adhesion,
             flow=scene.flow,
             inextensibility=SummedInextensibility(accuracy),
             layer=SummedSingleLayer(membranes, accuracy, parallel),

@@ -2,7 +2,7 @@
 
 from solver.flows import Extension, Flow, Shear, Trap
 from solver.model import Model, NonNegative, Positive
-from solver.scene.adhesion import Adhesion
+from solver.pair_potentials import Adhesion, PairPotential, PowerLaw
 from solver.scene.arrangement import Arrangement
 from solver.scene.criteria import Criteria
 from solver.scene.numerics import Numerics
@@ -22,7 +22,9 @@ __all__ = [
     "NonNegative",
     "Numerics",
     "Output",
+    "PairPotential",
     "Positive",
+    "PowerLaw",
     "Scene",
     "Shear",
     "Start",

@@ -12,7 +12,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from solver.flows import Flow
 from solver.model import Model, Positive
-from solver.scene.adhesion import Adhesion
+from solver.pair_potentials import Adhesion
 from solver.scene.arrangement import Arrangement
 from solver.scene.criteria import Criteria
 from solver.scene.ellipses import overlapping_pair

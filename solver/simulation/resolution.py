@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.analysis.spatial_error import shape_tails, spatial_error
-from solver.forces.adhesion import Adhesion
+from solver.forces.adhesion import Everywhere
 from solver.membrane.geometry import Geometry, Membranes
 from solver.membrane.symmetry import independent_vesicles
 from solver.motion.equation import accuracy_of
@@ -142,7 +142,8 @@ class AdaptiveResolution:
         self._least_distance = 0.0  # between membranes, over the spacing
         self._closest = np.inf  # distance to which adhesion draws the membranes
         if adhesion:
-            self._least_distance = Adhesion(adhesion, accuracy_of(numerics)).ratio / MAXIMUM_FACTOR
+            everywhere = Everywhere(adhesion.singularity, accuracy_of(numerics))
+            self._least_distance = everywhere.reach / MAXIMUM_FACTOR
             self._closest = adhesion.distance
         self.points = self._first(scene)
 

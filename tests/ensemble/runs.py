@@ -7,7 +7,7 @@ from dataclasses import fields, replace
 import numpy as np
 
 from solver.analysis.run import Energy, Errors, Frames, Outcome, Run, Viscosity, Work
-from solver.scene import Adhesion, Numerics, Scene, Shear, Vesicle
+from solver.scene import Numerics, PowerLaw, Scene, Shear, Vesicle
 
 
 def shear_scene(
@@ -20,7 +20,7 @@ def shear_scene(
             Vesicle(reduced_area=reduced_area, center=(-1.5, 0.0)),
             Vesicle(reduced_area=reduced_area, center=(1.5, 0.0)),
         ),
-        adhesion=Adhesion(hamaker=hamaker, distance=0.4),
+        adhesion=PowerLaw(hamaker=hamaker, distance=0.4),
         flow=Shear(rate=rate),
         numerics=Numerics(points=points),
     )

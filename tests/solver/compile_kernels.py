@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from solver.scene import LARGEST_DENSE, Adhesion, Scene
+from solver.scene import LARGEST_DENSE, PowerLaw, Scene
 from solver.simulation.simulate import simulate
 from tests.solver.scenes import fixed_horizon, uneven_pair, with_contrasts
 from tests.solver.suspensions import suspension
@@ -15,7 +15,7 @@ def scenes_that_use_every_kernel() -> list[Scene]:
     """Return scenes with few and with many vesicles, of both potentials, with and without a contrast."""
     pair = uneven_pair(**fixed_horizon(HORIZON))
     many = suspension(COUNT, **fixed_horizon(HORIZON))
-    cutoff = {"adhesion": Adhesion(hamaker=1.0, distance=0.4, cutoff=1.2)}
+    cutoff = {"adhesion": PowerLaw(hamaker=1.0, distance=0.4, cutoff=1.2)}
     return [
         pair,
         pair.model_copy(update=cutoff),

@@ -13,7 +13,7 @@ import numpy as np
 
 from solver import RESULTS_REVISION, Run, Scene, simulate
 from solver.flows import Extension, Shear, Trap
-from solver.scene import Adhesion, Numerics, Start, Vesicle
+from solver.scene import Numerics, PowerLaw, Start, Vesicle
 from tests.solver.scenes import fixed_horizon, shear_pair, uneven_pair, with_contrasts
 from tests.solver.suspensions import suspension
 
@@ -39,7 +39,7 @@ SCENES = {
     "imex-euler": uneven_pair(numerics=_numerics("imex-euler", tolerance=1e-3), **SHORT),
     "exponents": uneven_pair(exponents=(5, 3), numerics=_numerics("bdf"), **SHORT),
     "cutoff": uneven_pair(
-        adhesion=Adhesion(hamaker=1.5, distance=0.4, cutoff=1.1), numerics=_numerics("bdf"), **SHORT
+        adhesion=PowerLaw(hamaker=1.5, distance=0.4, cutoff=1.1), numerics=_numerics("bdf"), **SHORT
     ),
     "close": uneven_pair(vesicles=CLOSE, adhesion=None, flow=Shear(rate=0.5), **fixed_horizon(0.5)),
     "contrast": with_contrasts(
@@ -55,7 +55,7 @@ SCENES = {
     "many-sdc": suspension(7, numerics=_numerics("sdc"), horizon=0.3),
     "many-cutoff": suspension(
         7,
-        adhesion=Adhesion(hamaker=1.0, distance=0.4, cutoff=1.2),
+        adhesion=PowerLaw(hamaker=1.0, distance=0.4, cutoff=1.2),
         numerics=_numerics("bdf"),
         horizon=0.3,
     ),

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.membrane.geometry import Geometry, Membranes
-from solver.scene import Adhesion, Criteria, Scene, Shear, Vesicle
+from solver.scene import Criteria, PowerLaw, Scene, Shear, Vesicle
 from solver.simulation.initial_state import initial_ellipses
 
 Array = NDArray[np.float64]
@@ -19,7 +19,7 @@ def shear_pair(hamaker: float, rate: float = 0.5, horizon: float = 100.0, **fiel
     return Scene(
         horizon=horizon,
         vesicles=(Vesicle(center=(-1.5, 0.0)), Vesicle(center=(1.5, 0.0))),
-        adhesion=Adhesion(hamaker=hamaker, distance=0.4),
+        adhesion=PowerLaw(hamaker=hamaker, distance=0.4),
         flow=Shear(rate=rate),
         **fields,
     )
@@ -38,7 +38,7 @@ def uneven_pair(hamaker: float = 1.5, exponents: tuple[int, int] = (4, 2), **fie
             Vesicle(reduced_area=0.85, center=(-1.1, 0.1), angle=1.3),
             Vesicle(reduced_area=0.95, length=5.0, bending_modulus=2.5, center=(0.85, -0.2), angle=0.4),
         ),
-        "adhesion": Adhesion(hamaker=hamaker, distance=0.4, exponents=exponents),
+        "adhesion": PowerLaw(hamaker=hamaker, distance=0.4, exponents=exponents),
     }
     return Scene(**defaults | fields)
 

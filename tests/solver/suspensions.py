@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from solver.scene import Adhesion, Numerics, Scene, Shear, Vesicle
+from solver.scene import Numerics, PowerLaw, Scene, Shear, Vesicle
 
 
 def suspension(count: int, points: int = 32, tolerance: float = 1e-3, **fields: Any) -> Scene:
@@ -26,7 +26,7 @@ def suspension(count: int, points: int = 32, tolerance: float = 1e-3, **fields: 
     defaults: dict[str, Any] = {
         "horizon": 1.0,
         "vesicles": vesicles,
-        "adhesion": Adhesion(hamaker=1.0, distance=0.4),
+        "adhesion": PowerLaw(hamaker=1.0, distance=0.4),
         "flow": Shear(rate=1.0),
         "numerics": Numerics(points=points, tolerance=tolerance),
     }

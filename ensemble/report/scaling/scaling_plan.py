@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from solver.scene import Adhesion, Numerics, Scene, Shear, Vesicle
+from solver.scene import Numerics, PowerLaw, Scene, Shear, Vesicle
 from solver.scene.arrangement import Random
 
 POINTS = 64  # on each vesicle
@@ -56,7 +56,7 @@ def suspension(vesicles: int) -> Scene:
     return Scene(
         horizon=20.0,
         vesicles=placed,
-        adhesion=Adhesion(hamaker=1.5, distance=0.4),
+        adhesion=PowerLaw(hamaker=1.5, distance=0.4),
         flow=Shear(rate=0.5),
         numerics=Numerics(points=POINTS),
     )

@@ -14,11 +14,11 @@ from typing import Any
 from pydantic import BaseModel
 
 from solver.scene import (
-    Adhesion,
     Criteria,
     Extension,
     Numerics,
     Output,
+    PowerLaw,
     Scene,
     Shear,
     Start,
@@ -51,9 +51,9 @@ def _scene(*vesicles: Vesicle, **fields: Any) -> Scene:
 def _pair(gap: float = 1.0, shift: float = 0.2, **fields: Any) -> Scene:
     """Return two upright vesicles side by side, ``gap`` apart and a little shifted along each other.
 
-    Fields of `Vesicle` and `Adhesion`, and those that `_scene` takes, change the defaults.
+    Fields of `Vesicle` and `PowerLaw`, and those that `_scene` takes, change the defaults.
     """
-    adhesion = Adhesion(**({"hamaker": 1.5, "distance": 0.4} | _fields_of(Adhesion, fields)))
+    adhesion = PowerLaw(**({"hamaker": 1.5, "distance": 0.4} | _fields_of(PowerLaw, fields)))
     vesicle = Vesicle(**_fields_of(Vesicle, fields))
     _, half_width = semi_axes(vesicle.reduced_area, vesicle.length)
     centers = [(side * (half_width + gap / 2), side * shift / 2) for side in (-1, 1)]
@@ -69,7 +69,7 @@ def _unequal(first: Mapping[str, Any], second: Mapping[str, Any], **fields: Any)
         _, half_width = semi_axes(vesicle.reduced_area, vesicle.length)
         center = (side * (half_width + 0.5), side * 0.1)
         vesicles.append(vesicle.model_copy(update={"center": center}))
-    return _scene(*vesicles, adhesion=Adhesion(hamaker=1.5, distance=0.4), **fields)
+    return _scene(*vesicles, adhesion=PowerLaw(hamaker=1.5, distance=0.4), **fields)
 
 
 def _fields_of(model: type[BaseModel], fields: dict[str, Any]) -> dict[str, Any]:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from solver.scene import Adhesion, Criteria, Output, Scene, Shear, Trap, Vesicle
+from solver.scene import Criteria, Output, PowerLaw, Scene, Shear, Trap, Vesicle
 
 
 def _to_the_horizon(scene: Scene) -> Scene:
@@ -28,7 +28,7 @@ SHORT_SCENES: Mapping[str, Scene] = MappingProxyType(
             "doublet in shear": Scene(
                 horizon=20.0,
                 vesicles=(Vesicle(center=(-1.5, 0.0)), Vesicle(center=(1.5, 0.0))),
-                adhesion=Adhesion(hamaker=1.5, distance=0.4),
+                adhesion=PowerLaw(hamaker=1.5, distance=0.4),
                 flow=Shear(rate=0.5),
             ),
             "doublet in a trap": Scene(
@@ -41,13 +41,13 @@ SHORT_SCENES: Mapping[str, Scene] = MappingProxyType(
                     )
                     for side in (-1.1, 1.1)
                 ),
-                adhesion=Adhesion(hamaker=0.7, distance=0.4),
+                adhesion=PowerLaw(hamaker=0.7, distance=0.4),
                 flow=Trap(rate=0.09),
             ),
             "collision at rest": Scene(
                 horizon=20.0,
                 vesicles=(Vesicle(center=(-1.5, 0.0)), Vesicle(center=(1.5, 0.3), angle=1.2)),
-                adhesion=Adhesion(hamaker=1.5, distance=0.4),
+                adhesion=PowerLaw(hamaker=1.5, distance=0.4),
             ),
             "vesicle in shear": Scene(horizon=20.0, vesicles=(Vesicle(),), flow=Shear(rate=0.5)),
         }.items()

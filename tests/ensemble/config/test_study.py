@@ -19,7 +19,7 @@ from ensemble.config.study import Study
 from ensemble.search.critical_value import SearchStatus, Side
 from ensemble.search.study_search import critical_value_search, expected_bracket, side_of
 from solver.analysis.run import Outcome
-from solver.scene import Adhesion, Scene, Shear, Trap
+from solver.scene import PowerLaw, Scene, Shear, Trap
 
 DOUBLET_STUDIES = (
     "critical-extension-hamaker",
@@ -92,11 +92,11 @@ def test_parameters_of_the_published_scenes() -> None:
     shear = load_scene("doublet-shear")
     assert [vesicle.center for vesicle in shear.vesicles] == [(-1.5, 0.0), (1.5, 0.0)]
     assert {vesicle.reduced_area for vesicle in shear.vesicles} == {0.9}
-    assert shear.adhesion == Adhesion(hamaker=1.5, distance=0.4)
+    assert shear.adhesion == PowerLaw(hamaker=1.5, distance=0.4)
     assert shear.flow == Shear(rate=0.5)
     trap = load_scene("doublet-trap")
     assert {vesicle.reduced_area for vesicle in trap.vesicles} == {0.8}
-    assert trap.adhesion == Adhesion(hamaker=0.7, distance=0.4)
+    assert trap.adhesion == PowerLaw(hamaker=0.7, distance=0.4)
     assert trap.flow == Trap(rate=0.09)
     assert trap.start.relaxed
     assert trap.start.tilt == 1e-3
@@ -120,7 +120,7 @@ def test_tens_of_vesicles_begin_within_reach_of_adhesion_but_apart(name: str) ->
 def test_scene_at_sets_both_parameters_and_nothing_else() -> None:
     scene = HAMAKER.scene_at(1.25, 0.8)
     assert scene.flow == Shear(rate=1.25)
-    assert scene.adhesion == Adhesion(hamaker=0.8, distance=0.4)
+    assert scene.adhesion == PowerLaw(hamaker=0.8, distance=0.4)
     restored = scene.model_copy(update={"flow": HAMAKER.scene.flow, "adhesion": HAMAKER.scene.adhesion})
     assert restored == HAMAKER.scene
     trap = load_study("critical-extension-rate").scene_at(0.65, 0.1)

@@ -14,7 +14,7 @@ from solver.analysis.run import Run
 from solver.motion.dense import DenseEquation
 from solver.motion.summed import SummedEquation
 from solver.parallel import SERIAL, Parallel
-from solver.scene import LARGEST_DENSE, Adhesion, Numerics, Scene, Shear, Trap, Vesicle
+from solver.scene import LARGEST_DENSE, Numerics, PowerLaw, Scene, Shear, Trap, Vesicle
 from solver.simulation.initial_state import initial_ellipses
 from solver.simulation.simulate import simulate
 from tests.solver.scenes import shear_pair, uneven_pair
@@ -30,9 +30,9 @@ SCENES = {
         flow=Trap(rate=0.3),
         vesicles=(Vesicle(center=(-0.8, 0.0)), Vesicle(length=5.0, center=(0.6, 0.0), angle=1.4)),
     ),
-    "cutoff": uneven_pair(adhesion=Adhesion(hamaker=1.5, distance=0.4, cutoff=1.1)),
+    "cutoff": uneven_pair(adhesion=PowerLaw(hamaker=1.5, distance=0.4, cutoff=1.1)),
 }
-CUTOFF = suspension(LARGEST_DENSE + 1, adhesion=Adhesion(hamaker=1.0, distance=0.4, cutoff=1.2))
+CUTOFF = suspension(LARGEST_DENSE + 1, adhesion=PowerLaw(hamaker=1.0, distance=0.4, cutoff=1.2))
 MANY = suspension(LARGEST_DENSE + 1, horizon=0.2)
 DOUBLET = shear_pair(3.5, numerics=Numerics(points=32, tolerance=1e-3))
 

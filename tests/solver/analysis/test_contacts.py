@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solver.analysis.contacts import CONTACT, cluster_sizes, clusters, contacts
-from solver.scene import Adhesion, Numerics, Output, Scene, Shear, Vesicle
+from solver.scene import Numerics, Output, PowerLaw, Scene, Shear, Vesicle
 from solver.scene.arrangement import Lattice
 from solver.simulation.simulate import simulate
 from tests.solver.scenes import fixed_horizon, geometry_of, shear_pair
@@ -40,7 +40,7 @@ def aggregating() -> Scene:
     return Scene(
         horizon=2.0,
         vesicles=tuple(row),
-        adhesion=Adhesion(hamaker=1.5, distance=0.4),
+        adhesion=PowerLaw(hamaker=1.5, distance=0.4),
         numerics=Numerics(points=32, tolerance=1e-3),
     )
 

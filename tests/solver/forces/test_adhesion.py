@@ -10,12 +10,12 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from solver.forces.adhesion import Adhesion
-from solver.forces.power_law import Potential, adhesion_energy, adhesion_force
-from solver.membrane.geometry import Geometry
+from solver.forces.adhesion import DirectAdhesion
+from solver.forces.pair_formulas import formula_and_parameters
+from solver.forces.pair_sums import add_forces, pair_energy
+from solver.membrane.geometry import Geometry, Membranes
 from solver.potentials.proximity import Closeness, gap
-from solver.scene import Adhesion as AdhesionParameters
-from solver.scene import Numerics, Scene, Vesicle
+from solver.scene import Numerics, PowerLaw, Scene, Vesicle
 from solver.simulation.initial_state import initial_ellipses
 from tests.solver.references import Ellipse, integrate, nearest_parameter
 from tests.solver.scenes import geometry_of, smooth_direction, uneven_pair
@@ -27,10 +27,10 @@ EXPONENTS = [(3, 2), (4, 2), (5, 2), (4, 3), (7, 3), (8, 6), (9, 6), (12, 5), (1
 
 def density(scene: Scene, geometry: Geometry, accuracy: float = 1e-12) -> Array:
     assert scene.adhesion
-    return Adhesion(scene.adhesion, accuracy).density(geometry, Closeness(geometry))
+    return DirectAdhesion(scene.adhesion, accuracy, geometry.membranes).density(geometry, Closeness(geometry))
 
 
-def energy_of(adhesion: Adhesion, scene: Scene) -> float:
+def energy_of(adhesion: DirectAdhesion, scene: Scene) -> float:
     geometry = geometry_of(scene)
     return adhesion.energy(geometry, Closeness(geometry))
 
@@ -68,7 +68,7 @@ def test_the_force_is_minus_the_gradient_of_the_energy(exponents: tuple[int, int
     membranes, state = geometry.membranes, initial_ellipses(scene)
     direction, step = smooth_direction(membranes), 2e-3
     assert scene.adhesion
-    adhesion = Adhesion(scene.adhesion, 1e-12)
+    adhesion = DirectAdhesion(scene.adhesion, 1e-12, membranes)
     around = [Geometry(membranes, state + k * step * direction) for k in (-2, -1, 1, 2)]
     weights = np.array([1, -8, 8, -1]) / (12 * step)
     energy_change = weights @ [adhesion.energy(g, Closeness(g)) for g in around]
@@ -91,7 +91,7 @@ def test_the_force_is_exact_at_any_gap(exponents: tuple[int, int], distance_of_c
             Vesicle(reduced_area=0.9, angle=0.0),
             Vesicle(reduced_area=0.85, length=length, angle=0.0, center=(0.03, -depth)),
         ),
-        adhesion=AdhesionParameters(hamaker=1.7, distance=0.05, exponents=exponents),
+        adhesion=PowerLaw(hamaker=1.7, distance=0.05, exponents=exponents),
         numerics=Numerics(points=points),
     )
     geometry = geometry_of(scene)
@@ -123,7 +123,7 @@ def test_forces_on_a_pair_balance(exponents: tuple[int, int]) -> None:
 
 @pytest.mark.parametrize("exponents", [(4, 2), (12, 6), (5, 3)])
 def test_forces_on_three_vesicles_balance(exponents: tuple[int, int]) -> None:
-    adhesion = AdhesionParameters(hamaker=1.5, distance=0.3, exponents=exponents)
+    adhesion = PowerLaw(hamaker=1.5, distance=0.3, exponents=exponents)
     scene = trio(adhesion=adhesion, numerics=Numerics(points=128))
     geometry = geometry_of(scene)
     force = density(scene, geometry)
@@ -148,7 +148,7 @@ def test_three_vesicles_feel_the_sum_of_their_pairs() -> None:
 def test_the_energy_counts_every_pair_once() -> None:
     scene = trio()
     assert scene.adhesion
-    adhesion = Adhesion(scene.adhesion, 1e-12)
+    adhesion = DirectAdhesion(scene.adhesion, 1e-12, Membranes.of_scene(scene))
     parts = [
         energy_of(adhesion, scene.model_copy(update={"vesicles": (first, second)}))
         for first, second in combinations(scene.vesicles, 2)
@@ -168,7 +168,7 @@ def test_the_energy_of_a_pair_against_brute_force() -> None:
     q = scene.adhesion.distance / np.hypot(*offset)
     weight = 2 * np.pi / 800
     exact = 1.3 * weight**2 * first.speed(alpha) @ (q**4 - 2 * q**2) @ second.speed(alpha)
-    energy = energy_of(Adhesion(scene.adhesion, 1e-12), scene)
+    energy = energy_of(DirectAdhesion(scene.adhesion, 1e-12, Membranes.of_scene(scene)), scene)
     assert energy == pytest.approx(exact, rel=1e-11)
 
 
@@ -181,7 +181,7 @@ def test_closer_than_the_distance_repels_and_farther_attracts() -> None:
                 Vesicle(reduced_area=1.0),
                 Vesicle(reduced_area=1.0, center=(2 + separation, 0.0)),
             ),
-            adhesion=AdhesionParameters(hamaker=1.0, distance=0.4),
+            adhesion=PowerLaw(hamaker=1.0, distance=0.4),
         )
         geometry = geometry_of(scene)
         assert gap(geometry) == pytest.approx(separation, abs=1e-3)
@@ -200,7 +200,7 @@ def test_the_jacobian_is_exact(exponents: tuple[int, int], points: int) -> None:
     geometry = geometry_of(scene)
     membranes = geometry.membranes
     assert scene.adhesion
-    adhesion = Adhesion(scene.adhesion, 1e-6)
+    adhesion = DirectAdhesion(scene.adhesion, 1e-6, membranes)
     random = np.random.default_rng(0)
     directions = [smooth_direction(membranes), *np.eye(len(state))[random.integers(0, len(state), 4)]]
     directions += list(np.eye(len(state))[-4:])
@@ -239,15 +239,16 @@ def test_parallel_lines(
     end = (count + 0.5) * spacing
     line = np.stack([x, np.zeros_like(x)])
     m, n = exponents
-    potential = Potential(distance, m, n)
-    force = np.empty((2, 1))
+    law = formula_and_parameters(PowerLaw(hamaker=1.0, distance=distance, exponents=exponents))
+    weights = np.full(x.size, spacing)
 
     def pull(d: float) -> float:
-        adhesion_force(np.array([[0.0], [d]]), line, potential, spacing, force)
+        force = np.zeros((2, 1))
+        add_forces(*law, np.array([[0.0], [d]]), line, weights, 1.0, force)
         return float(force[1, 0])
 
     equilibrium = brentq(pull, 0.7 * distance, 1.2 * distance, xtol=1e-13)
     assert equilibrium / distance == pytest.approx(separation[0], abs=separation[1])
-    near = spacing * adhesion_energy(np.array([[0.0], [equilibrium]]), line, potential)
+    near = pair_energy(*law, np.array([[0.0], [equilibrium]]), line, weights)
     beyond = -2 * m / n * distance**n * end ** (1 - n) / (n - 1)  # the attraction of the ends left out
     assert (near + beyond) / distance == pytest.approx(energy[0], abs=energy[1])

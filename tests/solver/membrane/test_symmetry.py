@@ -9,7 +9,7 @@ import pytest
 
 from solver.membrane.symmetry import has_images, independent_vesicles
 from solver.motion.dense import DenseEquation
-from solver.scene import Adhesion, Criteria, Extension, Numerics, Scene, Shear, Start, Trap, Vesicle
+from solver.scene import Criteria, Extension, Numerics, PowerLaw, Scene, Shear, Start, Trap, Vesicle
 from solver.simulation.initial_state import initial_ellipses
 from solver.simulation.simulate import simulate
 from tests.solver.scenes import shear_pair, smooth_direction
@@ -20,7 +20,7 @@ FLOWS = [Shear(rate=0.5), Extension(rate=0.1), Trap(rate=0.1), None]
 def pair(first: dict[str, object], second: dict[str, object], **fields: object) -> Scene:
     vesicles = (Vesicle.model_validate(first), Vesicle.model_validate(second))
     return Scene.model_validate(
-        {"horizon": 5.0, "vesicles": vesicles, "adhesion": Adhesion(hamaker=1.5, distance=0.4)} | fields
+        {"horizon": 5.0, "vesicles": vesicles, "adhesion": PowerLaw(hamaker=1.5, distance=0.4)} | fields
     )
 
 

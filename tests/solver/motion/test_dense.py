@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from solver.forces import adhesion as adhesion_module
 from solver.membrane.geometry import Geometry
 from solver.motion import dense as dynamics_module
 from solver.motion.dense import DenseEquation
 from solver.potentials import viscosity_contrast as contrast_module
 from solver.potentials.proximity import Closeness
 from solver.potentials.single_layer import SingleLayer
-from solver.scene import Adhesion, Extension, Numerics, Scene, Shear, Trap, Vesicle
+from solver.scene import Extension, Numerics, PowerLaw, Scene, Shear, Trap, Vesicle
 from solver.simulation.initial_state import initial_ellipses
 from tests.solver.scenes import smooth_direction, uneven_pair
 
@@ -97,9 +98,9 @@ def test_forces_feed_what_the_fluid_dissipates() -> None:
 
 
 TERMS = [
-    (dynamics_module, "Adhesion"),
+    (dynamics_module, "DirectAdhesion"),
     (dynamics_module, "Closeness"),
-    (dynamics_module, "TruncatedAdhesion"),
+    (adhesion_module, "WithinCutoff"),
     (dynamics_module, "ViscosityContrast"),
     (contrast_module, "DoubleLayer"),
 ]
@@ -122,7 +123,7 @@ def constructed(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
 
 VESICLE, OTHER = Vesicle(center=(-1.5, 0.0)), Vesicle(center=(1.5, 0.0))
 VISCOUS = Vesicle(center=(-1.5, 0.0), viscosity_contrast=3.0)
-ADHESION = Adhesion(hamaker=1.0, distance=0.4)
+ADHESION = PowerLaw(hamaker=1.0, distance=0.4)
 
 
 @pytest.mark.parametrize(
@@ -131,15 +132,15 @@ ADHESION = Adhesion(hamaker=1.0, distance=0.4)
         ({"vesicles": (VESICLE,)}, set()),
         ({"vesicles": (VESICLE,), "adhesion": ADHESION}, set()),
         ({"vesicles": (VESICLE, OTHER)}, {"Closeness"}),
-        ({"vesicles": (VESICLE, OTHER), "adhesion": ADHESION}, {"Closeness", "Adhesion"}),
+        ({"vesicles": (VESICLE, OTHER), "adhesion": ADHESION}, {"Closeness", "DirectAdhesion"}),
         ({"vesicles": (VESICLE,), "flow": Trap(rate=0.5)}, set()),
         (
             {"vesicles": (VESICLE, OTHER), "adhesion": ADHESION, "flow": Shear(rate=0.5)},
-            {"Closeness", "Adhesion"},
+            {"Closeness", "DirectAdhesion"},
         ),
         (
             {"vesicles": (VESICLE, OTHER), "adhesion": ADHESION.model_copy(update={"cutoff": 1.0})},
-            {"Closeness", "TruncatedAdhesion"},
+            {"Closeness", "DirectAdhesion", "WithinCutoff"},
         ),
         ({"vesicles": (VISCOUS,)}, {"ViscosityContrast", "DoubleLayer"}),
         ({"vesicles": (VISCOUS, OTHER)}, {"Closeness", "ViscosityContrast", "DoubleLayer"}),
@@ -161,7 +162,7 @@ def test_the_terms_are_constructed_once_a_simulation(constructed: Counter[str]) 
     dynamics = DenseEquation.of(scene)
     for _ in range(3):
         dynamics.rate(initial_ellipses(scene))
-    assert constructed["Adhesion"] == 1
+    assert constructed["DirectAdhesion"] == 1
 
 
 def test_vesicles_far_apart_are_not_interpolated(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -182,7 +183,7 @@ def test_vesicles_far_apart_are_not_interpolated(monkeypatch: pytest.MonkeyPatch
 @pytest.mark.parametrize(
     "zero",
     [
-        {"adhesion": Adhesion(hamaker=0.0, distance=0.4)},
+        {"adhesion": PowerLaw(hamaker=0.0, distance=0.4)},
         {"flow": Shear(rate=0.0)},
         {"flow": Extension(rate=0.0)},
         {"flow": Trap(rate=0.0)},

@@ -9,17 +9,13 @@ import pytest
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from solver.forces.adhesion import Adhesion as FewAdhesion
-from solver.forces.adhesion_sums import fill_hessian
-from solver.forces.far_adhesion import seen
-from solver.forces.power_law import Potential
-from solver.forces.summed_adhesion import SummedAdhesion
-from solver.forces.truncated_adhesion import TruncatedAdhesion
+from solver.forces import coarsened_adhesion
+from solver.forces.adhesion import DirectAdhesion
+from solver.forces.coarsened_adhesion import CoarsenedAdhesion, coarsened_sources
 from solver.integrators import InitialValueProblem
 from solver.integrators.bdf import BackwardDifferentiation
 from solver.integrators.sdc import DeferredCorrection
 from solver.membrane.geometry import Geometry, Membranes
-from solver.motion import summed as summed_module
 from solver.motion.dense import DenseEquation
 from solver.motion.form import equation_of_motion
 from solver.motion.summed import SummedEquation
@@ -29,7 +25,7 @@ from solver.potentials.direct_sum import velocity as direct_velocity
 from solver.potentials.neighbors import Neighbors
 from solver.potentials.proximity import Closeness, gap
 from solver.potentials.refinement import LARGEST_REFINED
-from solver.scene import LARGEST_DENSE, Adhesion, Extension, Numerics, Scene, Shear, Trap, Vesicle
+from solver.scene import LARGEST_DENSE, Extension, Numerics, PowerLaw, Scene, Shear, Trap, Vesicle
 from solver.simulation.initial_state import initial_ellipses
 from solver.simulation.simulate import simulate
 from tests.solver.steps import all_steps, equal_steps
@@ -57,9 +53,9 @@ def close_together(points: int, **fields: Any) -> Scene:
     "fields",
     [
         {"flow": Shear(rate=0.8)},
-        {"flow": Extension(rate=0.3), "adhesion": Adhesion(hamaker=1.5, distance=0.3)},
-        {"flow": Trap(rate=0.3), "adhesion": Adhesion(hamaker=1.5, distance=0.3, exponents=(5, 3))},
-        {"adhesion": Adhesion(hamaker=1.5, distance=0.3, cutoff=1.2)},
+        {"flow": Extension(rate=0.3), "adhesion": PowerLaw(hamaker=1.5, distance=0.3)},
+        {"flow": Trap(rate=0.3), "adhesion": PowerLaw(hamaker=1.5, distance=0.3, exponents=(5, 3))},
+        {"adhesion": PowerLaw(hamaker=1.5, distance=0.3, cutoff=1.2)},
     ],
     ids=["shear", "extension", "trap", "cutoff"],
 )
@@ -138,7 +134,7 @@ def test_blocks_of_the_jacobian_are_those_of_vesicles_far_from_the_others() -> N
 @pytest.mark.parametrize("cutoff", [None, 1.2])
 def test_blocks_contain_how_others_draw_a_vesicle(cutoff: float | None) -> None:
     """Against differences of the adhesion force while one vesicle is shifted."""
-    scene = suspension(4, 64, 1e-9, adhesion=Adhesion(hamaker=1.0, distance=0.4, cutoff=cutoff))
+    scene = suspension(4, 64, 1e-9, adhesion=PowerLaw(hamaker=1.0, distance=0.4, cutoff=cutoff))
     sums, state, step = SummedEquation.of(scene, SERIAL), initial_ellipses(scene), 1e-5
     assert sums.adhesion
     membranes = sums.membranes
@@ -185,22 +181,19 @@ def test_adhesion_between_far_vesicles_needs_few_of_their_points(
     accuracy: float, exponents: tuple[int, int]
 ) -> None:
     geometry = scattered(16, 64)
-    parameters = Adhesion(hamaker=1.0, distance=0.4, exponents=exponents)
+    potential = PowerLaw(hamaker=1.0, distance=0.4, exponents=exponents)
     near, everyone = Neighbors(geometry, 8.0), Closeness(geometry)
-    sums, exact = SummedAdhesion(parameters, accuracy, SERIAL), FewAdhesion(parameters, 1e-12)
-    needed = -2 * float(np.log(accuracy))
-    assert all(sources.shape[1] < 15 * 64 for *_, sources in seen(geometry, slice(0, 16 * 64), needed))
+    sums = CoarsenedAdhesion(potential, accuracy, SERIAL)
+    exact = DirectAdhesion(potential, 1e-12, geometry.membranes)
+    decay = -2 * float(np.log(accuracy))
+    coarsened = coarsened_sources(geometry, slice(0, 16 * 64), decay)
+    assert all(weights.size < 15 * 64 for *_, weights in coarsened)
     expected = exact.density(geometry, everyone)
     allowed = 10 * accuracy * np.max(np.abs(expected))
     np.testing.assert_allclose(sums.density(geometry, near), expected, rtol=0, atol=allowed)
     assert sums.energy(geometry, near) == pytest.approx(exact.energy(geometry, everyone), rel=accuracy)
-    hessian = np.empty((2, 16 * 64, 2, 16 * 64))
-    spacing, potential = geometry.membranes.spacing, Potential(0.4, *exponents)
-    groups = everyone.refinement(exact.ratio)
-    fill_hessian(geometry.points, spacing, groups, potential, float(exponents[0]), hessian)
-    rows = np.arange(16 * 64)
-    stiffness = np.stack([hessian[a, rows, b, rows] for a, b in ((0, 0), (0, 1), (1, 1))])
-    found = sums.stiffness(geometry, near).reshape(3, -1)
+    stiffness = exact.stiffness(geometry, everyone)
+    found = sums.stiffness(geometry, near)
     np.testing.assert_allclose(found, stiffness, rtol=0, atol=10 * accuracy * np.max(np.abs(stiffness)))
 
 
@@ -291,8 +284,8 @@ def test_terms_that_a_scene_lacks_are_never_constructed(monkeypatch: pytest.Monk
     def refuse(*_: Any) -> None:
         raise AssertionError("constructed")
 
-    monkeypatch.setattr(summed_module, "SummedAdhesion", refuse)
-    monkeypatch.setattr(summed_module, "TruncatedAdhesion", refuse)
+    monkeypatch.setattr(coarsened_adhesion, "CoarsenedAdhesion", refuse)
+    monkeypatch.setattr(coarsened_adhesion, "DirectAdhesion", refuse)
     scene = suspension(LARGEST_DENSE + 1, adhesion=None, flow=None)
     sums = SummedEquation.of(scene, SERIAL)
     sums.rate(initial_ellipses(scene))
@@ -300,24 +293,24 @@ def test_terms_that_a_scene_lacks_are_never_constructed(monkeypatch: pytest.Monk
 
 
 @pytest.mark.parametrize(
-    ("cutoff", "needless"), [(None, "TruncatedAdhesion"), (1.2, "SummedAdhesion")], ids=["without", "with"]
+    ("cutoff", "needless"), [(None, "DirectAdhesion"), (1.2, "CoarsenedAdhesion")], ids=["without", "with"]
 )
-def test_a_cutoff_is_constructed_where_there_is_one(
+def test_the_adhesion_that_a_cutoff_needs_is_the_only_one_constructed(
     cutoff: float | None, needless: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(*_: Any) -> None:
         raise AssertionError("constructed")
 
-    monkeypatch.setattr(summed_module, needless, refuse)
-    adhesion = Adhesion(hamaker=1.0, distance=0.4, cutoff=cutoff)
+    monkeypatch.setattr(coarsened_adhesion, needless, refuse)
+    adhesion = PowerLaw(hamaker=1.0, distance=0.4, cutoff=cutoff)
     assert SummedEquation.of(suspension(LARGEST_DENSE + 1, adhesion=adhesion), SERIAL).adhesion
 
 
 def test_beyond_the_cutoff_many_vesicles_feel_nothing() -> None:
     geometry = scattered(9, 64)
     nearest = gap(geometry)
-    parameters = Adhesion(hamaker=1.0, distance=0.1, cutoff=0.9 * nearest)
-    adhesion = TruncatedAdhesion(parameters, 1e-7, geometry.membranes)
+    potential = PowerLaw(hamaker=1.0, distance=0.1, cutoff=0.9 * nearest)
+    adhesion = DirectAdhesion(potential, 1e-7, geometry.membranes)
     near = Neighbors(geometry, adhesion.reach)
     assert adhesion.energy(geometry, near) == 0
     assert not np.any(adhesion.density(geometry, near))

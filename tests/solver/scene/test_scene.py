@@ -11,11 +11,11 @@ import pytest
 from pydantic import ValidationError
 
 from solver.scene import (
-    Adhesion,
     Criteria,
     Extension,
     Numerics,
     Output,
+    PowerLaw,
     Scene,
     Shear,
     Start,
@@ -152,7 +152,7 @@ FULL = Scene(
         Vesicle(reduced_area=1 / 3, center=(-1.5, 1e-17)),
         Vesicle(center=(1.7, 0.0), angle=-math.pi / 7),
     ),
-    adhesion=Adhesion(hamaker=2 / 3, distance=0.4, exponents=(12, 6)),
+    adhesion=PowerLaw(hamaker=2 / 3, distance=0.4, exponents=(12, 6)),
     flow=Trap(rate=0.09),
     start=Start(relaxed=True, tilt=1e-2),
     numerics=Numerics(points=96, tolerance=3e-7, integrator="bdf", work_limit=5000),

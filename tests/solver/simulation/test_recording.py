@@ -10,13 +10,13 @@ import pytest
 
 from solver.analysis.run import Run
 from solver.flows import Shear, Trap
-from solver.scene import Adhesion, Numerics, Output, Scene, Start, Vesicle
+from solver.scene import Numerics, Output, PowerLaw, Scene, Start, Vesicle
 from solver.simulation.simulate import simulate
 from tests.solver.scenes import fixed_horizon, shear_pair, uneven_pair, with_contrasts
 from tests.solver.suspensions import suspension
 
 COARSE = {"points": 32, "tolerance": 1e-3}
-CUTOFF = Adhesion(hamaker=1.5, distance=0.4, cutoff=1.2)
+CUTOFF = PowerLaw(hamaker=1.5, distance=0.4, cutoff=1.2)
 
 SCENES = {
     "one": Scene(vesicles=(Vesicle(reduced_area=0.8),), flow=Shear(rate=1.0), **fixed_horizon(3.0)),

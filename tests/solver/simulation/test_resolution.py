@@ -17,7 +17,7 @@ from solver.membrane.curve import positions
 from solver.membrane.geometry import Membranes
 from solver.motion.dense import DenseEquation
 from solver.parallel import Parallel
-from solver.scene import Adhesion, Criteria, Numerics, Output, Shear, Start, Trap, Vesicle
+from solver.scene import Criteria, Numerics, Output, PowerLaw, Shear, Start, Trap, Vesicle
 from solver.simulation import simulate as simulate_module
 from solver.simulation.initial_state import initial_ellipses
 from solver.simulation.resolution import (
@@ -46,7 +46,7 @@ def alone(reduced_area: float, **fields: Any) -> Scene:
     return Scene(horizon=1.0, vesicles=(Vesicle(reduced_area=reduced_area, **fields),))
 
 
-def touching(distance: float, adhesion: Adhesion | None) -> Scene:
+def touching(distance: float, adhesion: PowerLaw | None) -> Scene:
     """Two unit circles this far apart."""
     center = 1 + distance / 2
     vesicles = (Vesicle(reduced_area=1.0, center=(x, 0.0)) for x in (-center, center))
@@ -63,7 +63,7 @@ def strongly_adhering(hamaker: float, horizon: float) -> Scene:
     return Scene(
         horizon=horizon,
         vesicles=vesicles,
-        adhesion=Adhesion(hamaker=hamaker, distance=0.4),
+        adhesion=PowerLaw(hamaker=hamaker, distance=0.4),
         criteria=Criteria(extensions=1.0, steady_time=2 * horizon),
         output=Output(interval=0.1, frame_interval=0.5),
     )
@@ -120,7 +120,7 @@ def test_the_most_slender_vesicle_decides() -> None:
 
 
 def test_where_adhesion_acts_close_vesicles_get_more_points() -> None:
-    strong = Adhesion(hamaker=1.0, distance=0.4)
+    strong = PowerLaw(hamaker=1.0, distance=0.4)
     points = [first_points(touching(distance, strong)) for distance in (0.4, 0.01, 0.003)]
     assert points[0] == LADDER[0]
     assert points[0] < points[1] < points[2]
@@ -128,7 +128,7 @@ def test_where_adhesion_acts_close_vesicles_get_more_points() -> None:
 
 
 def test_a_short_adhesion_distance_gets_more_points_from_afar() -> None:
-    points = [first_points(touching(1.0, Adhesion(hamaker=1.0, distance=d))) for d in (0.4, 0.01, 0.003)]
+    points = [first_points(touching(1.0, PowerLaw(hamaker=1.0, distance=d))) for d in (0.4, 0.01, 0.003)]
     assert points[0] == LADDER[0]
     assert points[0] < points[1] < points[2]
 
@@ -182,7 +182,7 @@ def test_what_changes_fast_is_soon_judged_as_lasting() -> None:
 
 
 def test_past_the_ladder_a_rough_state_is_accepted_and_a_gap_too_small_refused() -> None:
-    adhesion = Adhesion(hamaker=1.0, distance=0.4)
+    adhesion = PowerLaw(hamaker=1.0, distance=0.4)
     near, far = touching(1e-4, adhesion), touching(0.1, adhesion)
     top = LADDER[-1]
     resolution = AdaptiveResolution(adaptive(far))

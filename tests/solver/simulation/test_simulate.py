@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from solver import Outcome, Run, Scene
 from solver.membrane.curve import area, positions, tangents
-from solver.scene import Adhesion, Extension, Numerics, Output, Shear, Start, Trap, Vesicle
+from solver.scene import Extension, Numerics, Output, PowerLaw, Shear, Start, Trap, Vesicle
 from solver.simulation.simulate import Cancelled, simulate
 from tests.solver.scenes import fixed_horizon, shear_pair, uneven_pair
 
@@ -122,7 +122,7 @@ def test_shear_seen_from_higher_up_only_carries_along() -> None:
 
 
 @pytest.mark.parametrize(
-    "zero", [{"adhesion": Adhesion(hamaker=0.0, distance=0.4)}, {"flow": Shear(rate=0.0)}]
+    "zero", [{"adhesion": PowerLaw(hamaker=0.0, distance=0.4)}, {"flow": Shear(rate=0.0)}]
 )
 def test_a_term_of_zero_strength_changes_round_off_only(zero: dict[str, Any]) -> None:
     without = uneven_pair(adhesion=None, numerics=Numerics(tolerance=1e-6), **fixed_horizon(3.0))
@@ -168,7 +168,7 @@ def test_a_nearly_round_vesicle_beside_another_stays_round(excess: float) -> Non
         Scene(
             horizon=20.0,
             vesicles=vesicles,
-            adhesion=Adhesion(hamaker=1.0, distance=0.4),
+            adhesion=PowerLaw(hamaker=1.0, distance=0.4),
             numerics=Numerics(work_limit=5000),
         )
     )
@@ -182,7 +182,7 @@ def test_three_vesicles_in_shear() -> None:
     vesicles = (Vesicle(center=(-2.4, 0.0)), Vesicle(center=(0.0, 0.1)), Vesicle(center=(2.4, -0.1)))
     run = simulate(
         Scene(
-            horizon=5.0, vesicles=vesicles, adhesion=Adhesion(hamaker=1.0, distance=0.4), flow=Shear(rate=0.5)
+            horizon=5.0, vesicles=vesicles, adhesion=PowerLaw(hamaker=1.0, distance=0.4), flow=Shear(rate=0.5)
         )
     )
     assert run.outcome is Outcome.UNDECIDED
@@ -226,7 +226,7 @@ def test_what_is_recorded_and_when() -> None:
     ("fields", "absent"),
     [
         ({}, {"gap", "center_distance", "center_angle", "adhesion_energy", "viscosity_bending_tension"}),
-        ({"adhesion": Adhesion(hamaker=1.0, distance=0.4)}, {"gap", "adhesion_energy"}),
+        ({"adhesion": PowerLaw(hamaker=1.0, distance=0.4)}, {"gap", "adhesion_energy"}),
         ({"flow": Extension(rate=0.01)}, {"viscosity_bending_tension", "gap"}),
         ({"flow": Shear(rate=0.1)}, {"viscosity_adhesion", "gap"}),
     ],

@@ -8,7 +8,7 @@ import pytest
 from solver.analysis.run import Outcome, Run
 from solver.membrane.geometry import Geometry, Membranes
 from solver.potentials.proximity import Closeness
-from solver.scene import Adhesion, Numerics, Scene, Vesicle
+from solver.scene import Numerics, PowerLaw, Scene, Vesicle
 from solver.simulation.simulate import simulate
 
 DISTANCE = 0.25
@@ -22,7 +22,7 @@ def relaxed(hamaker: float) -> tuple[Run, Geometry]:
     scene = Scene(
         horizon=400.0,
         vesicles=vesicles,
-        adhesion=Adhesion(hamaker=hamaker, distance=DISTANCE),
+        adhesion=PowerLaw(hamaker=hamaker, distance=DISTANCE),
         numerics=Numerics(points=96, tolerance=1e-4),
     )
     run = simulate(scene)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from solver.analysis.run import Outcome, Run
-from solver.scene import Adhesion, Criteria, Extension, Scene, Shear, Start, Trap, Vesicle
+from solver.scene import Criteria, Extension, PowerLaw, Scene, Shear, Start, Trap, Vesicle
 from solver.simulation.simulate import simulate
 from tests.solver.scenes import fixed_horizon, shear_pair
 
@@ -133,7 +133,7 @@ def test_a_tank_treading_vesicle_is_steady() -> None:
 
 def test_a_pair_at_rest_reaches_equilibrium() -> None:
     vesicles = (Vesicle(center=(-1.3, 0.0)), Vesicle(center=(1.3, 0.0)))
-    scene = Scene(horizon=200.0, vesicles=vesicles, adhesion=Adhesion(hamaker=1.0, distance=0.4))
+    scene = Scene(horizon=200.0, vesicles=vesicles, adhesion=PowerLaw(hamaker=1.0, distance=0.4))
     run = simulate(scene)
     assert run.outcome is Outcome.EQUILIBRIUM
     quiet = run.series["time"] > run.time - scene.criteria.steady_time
@@ -150,7 +150,7 @@ def trapped(rate: float, tilt: float = 1e-2) -> Scene:
             Vesicle(reduced_area=0.8, center=(-1.2, 0.0)),
             Vesicle(reduced_area=0.8, center=(1.2, 0.0)),
         ),
-        adhesion=Adhesion(hamaker=0.7, distance=0.4),
+        adhesion=PowerLaw(hamaker=0.7, distance=0.4),
         flow=Trap(rate=rate),
         start=Start(relaxed=True, tilt=tilt),
     )

@@ -9,13 +9,10 @@ import pytest
 from numpy.typing import NDArray
 
 from solver.analysis.run import Outcome
-from solver.forces.adhesion import Adhesion
-from solver.forces.truncated_adhesion import TruncatedAdhesion
-from solver.forces.truncated_power_law import TruncatedPotential, truncated_potential
+from solver.forces.adhesion import DirectAdhesion
 from solver.membrane.geometry import Geometry
 from solver.potentials.proximity import Closeness
-from solver.scene import Adhesion as AdhesionParameters
-from solver.scene import Numerics, Scene
+from solver.scene import Numerics, PowerLaw, Scene
 from solver.simulation.initial_state import initial_ellipses
 from solver.simulation.simulate import simulate
 from tests.solver.scenes import geometry_of, shear_pair, smooth_direction, uneven_pair
@@ -25,21 +22,17 @@ Array = NDArray[np.float64]
 DISTANCE, CUTOFF = 0.4, 1.1
 
 
-def parameters(cutoff: float | None = CUTOFF, exponents: tuple[int, int] = (4, 2)) -> AdhesionParameters:
-    return AdhesionParameters(hamaker=1.5, distance=DISTANCE, exponents=exponents, cutoff=cutoff)
+def parameters(cutoff: float | None = CUTOFF, exponents: tuple[int, int] = (4, 2)) -> PowerLaw:
+    return PowerLaw(hamaker=1.5, distance=DISTANCE, exponents=exponents, cutoff=cutoff)
 
 
 def scene(points: int = 96, cutoff: float | None = CUTOFF, **fields: Any) -> Scene:
     return uneven_pair(adhesion=parameters(cutoff, **fields), numerics=Numerics(points=points))
 
 
-def adhesion_of(scene: Scene, accuracy: float = 1e-9) -> TruncatedAdhesion:
+def adhesion_of(scene: Scene, accuracy: float = 1e-9) -> DirectAdhesion:
     assert scene.adhesion
-    return TruncatedAdhesion(scene.adhesion, accuracy, geometry_of(scene).membranes)
-
-
-def potential(exponents: tuple[int, int]) -> TruncatedPotential:
-    return TruncatedPotential(DISTANCE, *exponents, CUTOFF)
+    return DirectAdhesion(scene.adhesion, accuracy, geometry_of(scene).membranes)
 
 
 def whole(r: float, exponents: tuple[int, int]) -> float:
@@ -52,7 +45,7 @@ def test_the_potential_is_whole_below_the_distance_and_none_beyond_the_cutoff(
     exponents: tuple[int, int],
 ) -> None:
     def value(r: float) -> float:
-        return float(truncated_potential(r * r, potential(exponents))[0])
+        return parameters(exponents=exponents).evaluate(r * r)[0]
 
     for r in (0.2, 0.39, DISTANCE):
         assert value(r) == pytest.approx(whole(r, exponents), rel=1e-14)
@@ -68,10 +61,10 @@ def test_the_potential_is_whole_below_the_distance_and_none_beyond_the_cutoff(
 @pytest.mark.parametrize("exponents", [(4, 2), (12, 6), (5, 3)])
 @pytest.mark.parametrize("r", [0.3, 0.45, 0.8, 1.05])
 def test_its_derivatives_are_exact(exponents: tuple[int, int], r: float) -> None:
-    square, step = r * r, 1e-3 * r * r
+    potential, square, step = parameters(exponents=exponents), r * r, 1e-3 * r * r
     weights = np.array([1, -8, 8, -1]) / (12 * step)
-    around = np.array([truncated_potential(square + k * step, potential(exponents)) for k in (-2, -1, 1, 2)])
-    _, slope, bend = truncated_potential(square, potential(exponents))
+    around = np.array([potential.evaluate(square + k * step) for k in (-2, -1, 1, 2)])
+    _, slope, bend = potential.evaluate(square)
     scale = abs(bend) + abs(slope)
     np.testing.assert_allclose(weights @ around[:, :2], [slope, bend], rtol=0, atol=1e-6 * scale + 1e-9)
 
@@ -81,7 +74,7 @@ def test_four_derivatives_are_continuous_at_the_ends_of_the_switch(end: float) -
     """Of χ itself, the ratio to the whole potential: left of an end and right of it a constant."""
 
     def switch(r: float) -> float:
-        return float(truncated_potential(r * r, potential((4, 2)))[0] / whole(r, (4, 2)))
+        return parameters().evaluate(r * r)[0] / whole(r, (4, 2))
 
     inside = 1 if end == DISTANCE else -1
     steps = np.array([0.02, 0.01])
@@ -120,7 +113,9 @@ def test_the_jacobian_is_exact(setting: Scene) -> None:
 
 def test_a_far_cutoff_leaves_the_untruncated_adhesion() -> None:
     geometry = geometry_of(scene())
-    expected = Adhesion(parameters(None), 1e-9).density(geometry, Closeness(geometry))
+    expected = DirectAdhesion(parameters(None), 1e-9, geometry.membranes).density(
+        geometry, Closeness(geometry)
+    )
     errors = []
     for cutoff in (10.0, 40.0, 160.0):
         force = adhesion_of(scene(cutoff=cutoff)).density(geometry, Closeness(geometry))

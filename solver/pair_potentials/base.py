@@ -1,0 +1,88 @@
+"""What every pair potential states about itself."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import Any, Self
+
+from pydantic import model_validator
+
+from solver.model import Model, NonNegative, Positive
+from solver.pair_potentials.cutoff import truncate
+
+# φ/H and its first and second derivative by q = r².
+Derivatives = tuple[float, float, float]
+
+# From q and the potential's parameters; Numba compiles it.
+Formula = Callable[[float, Any], Derivatives]
+
+
+class PairPotential(Model, ABC):
+    """Energy φ(r) per squared length of membrane between points of different vesicles at the distance r.
+
+    The force per length at x is −∇ ∫ φ ds_y = −2 ∫ φ_q (x − y) ds_y over all other vesicles, with q = r².
+
+    Attributes
+    ----------
+    kind : str
+        Tells the registered potentials apart; a literal with itself as the default.
+    hamaker : float
+        H, the strength, energy/length²; the potential is proportional to it.
+    distance : float
+        δ, where the potential is least: closer points repel each other, farther ones attract.
+    cutoff : float or None
+        Distance beyond which points do not attract (`solver.pair_potentials.cutoff`); None if they always do.
+    """
+
+    kind: str
+    hamaker: NonNegative
+    distance: Positive
+    cutoff: Positive | None = None
+
+    @property
+    @abstractmethod
+    def formula(self) -> Formula:
+        """The function that computes φ/H and its first and second derivative by q.
+
+        A plain function of a module, from q and `parameters` to three numbers.  Numba compiles it: arithmetic
+        and the functions of `math` and NumPy, without calls of other functions.  The loops over pairs of
+        points become SIMD code if it has neither branches that depend on q nor library functions.
+        """
+
+    @property
+    @abstractmethod
+    def parameters(self) -> tuple[float, ...]:
+        """What `formula` is given besides q."""
+
+    @property
+    def singularity(self) -> float:
+        """The k of the 1/(s² + d²)^k that the force resembles along a straight membrane at the distance d.
+
+        With s the arclength along it, both are singular at s = ±id.  That decides how finely membranes are
+        sampled for each other.  A force that stays finite at r = 0 needs no more than this default.
+        """
+        return 1.0
+
+    def evaluate(self, square: float) -> Derivatives:
+        """Compute φ/H, cut off if the potential is, and its first and second derivative by r².
+
+        Parameters
+        ----------
+        square : float
+            r², length².
+
+        Returns
+        -------
+        tuple of three floats
+        """
+        derivatives = self.formula(square, self.parameters)
+        if self.cutoff is None:
+            return derivatives
+        return truncate(square, self.distance, self.cutoff, *derivatives)
+
+    @model_validator(mode="after")
+    def _cutoff_beyond_the_repulsion(self) -> Self:
+        if self.cutoff is not None and self.cutoff <= self.distance:
+            raise ValueError(f"cutoff must be more than the distance {self.distance}, got {self.cutoff}")
+        return self
