@@ -1,6 +1,6 @@
-"""The store: a directory of runs (zarr v3 groups) and a catalog of what is committed (SQLite,
-or a PostgreSQL server).
+"""The store: a directory of runs and a catalog of what is committed.
 
+Runs are zarr v3 groups, the catalog is an SQLite file or on a PostgreSQL server.
 A run is written to `staging/`, flushed to disk, renamed into `runs/` and then entered in the catalog.  Only
 that last step makes it exist, so a process may die at any moment: what it acknowledged is there, whole.  What
 it left behind is adopted if it is a whole run (`recovery`).  One lock file, held only for moments, keeps

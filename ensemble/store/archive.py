@@ -41,7 +41,15 @@ def _write_array(group: zarr.Group, name: str, array: NamedArray) -> None:
 
 
 def write_run(directory: Path, summary: RunSummary, run: Run) -> None:
-    """Write a run to a new directory."""
+    """Write a run to a new directory.
+
+    Parameters
+    ----------
+    directory : Path
+    summary : RunSummary
+        Of the run.
+    run : Run
+    """
     group = zarr.create_group(LocalStore(directory), zarr_format=3, attributes=summary.document())
     for name, array in arrays(run).items():
         _write_array(group, name, array)
@@ -93,6 +101,15 @@ def _reader(directory: Path, group: zarr.Group) -> Callable[[str], Array]:
 def read_summary(directory: Path) -> RunSummary:
     """Read the attributes of a run.
 
+    Parameters
+    ----------
+    directory : Path
+        Of the run.
+
+    Returns
+    -------
+    RunSummary
+
     Raises
     ------
     StoreError
@@ -103,6 +120,15 @@ def read_summary(directory: Path) -> RunSummary:
 
 def read_run(directory: Path) -> Run:
     """Read a run; every number has the bits that were written.
+
+    Parameters
+    ----------
+    directory : Path
+        Of the run.
+
+    Returns
+    -------
+    Run
 
     Raises
     ------

@@ -31,7 +31,16 @@ class Table(DeclarativeBase):
 
 
 class RunRow(Table):
-    """A committed run.  `document` is the JSON of its summary."""
+    """A committed run.
+
+    Attributes
+    ----------
+    key : str
+    created : str
+        Moment as text.
+    document : dict
+        JSON of its summary.
+    """
 
     __tablename__ = "runs"
 
@@ -51,9 +60,15 @@ class BoundaryRow(Table):
 
 
 class Record(NamedTuple):
-    """A run or a boundary as it was recorded: its key, and the JSON of its summary or of itself.
+    """A run or a boundary as it was recorded.
 
-    What a later version has added to the models is not in it, which then means the default.
+    A field that a later version has added to the models is missing in it, and has its default.
+
+    Attributes
+    ----------
+    key : str
+    json : str
+        Of the summary of a run, or of the boundary.
     """
 
     key: str
@@ -63,7 +78,7 @@ class Record(NamedTuple):
 # As text, since most of those who ask pass it on.
 _RUN = select(RunRow.key, cast(RunRow.document, Text))
 _BOUNDARY = select(BoundaryRow.study_key, cast(BoundaryRow.document, Text))
-# Made once: to make a statement takes longer than to answer it.
+# Built once: to build a statement takes longer than to answer it.
 _ONE_RUN = _RUN.where(RunRow.key == bindparam("key"))
 _ONE_BOUNDARY = _BOUNDARY.where(BoundaryRow.study_key == bindparam("key"))
 
@@ -125,7 +140,12 @@ class Catalog:
         self._engine.dispose()
 
     def insert(self, summary: RunSummary) -> None:
-        """Add a run; it exists from the moment that this returns."""
+        """Add a run; it exists from the moment that this returns.
+
+        Parameters
+        ----------
+        summary : RunSummary
+        """
         row = {
             "key": summary.key,
             "created": timestamp_text(summary.created),
@@ -135,21 +155,55 @@ class Catalog:
             connection.execute(insert(RunRow), row)
 
     def keys(self) -> set[str]:
-        """Keys of all runs."""
+        """Return the keys of all runs."""
         with self._engine.connect() as connection:
             return set(connection.scalars(select(RunRow.key)))
 
     def run(self, key: str) -> Record | None:
-        """One run, None if there is none of this key."""
+        """Return a run as it was recorded.
+
+        Parameters
+        ----------
+        key : str
+
+        Returns
+        -------
+        Record or None
+            None if there is no such run.
+        """
         return self._one(_ONE_RUN, key)
 
     def runs(self, where: Sequence[str]) -> list[Record]:
-        """Runs that meet all filters, oldest first."""
+        """Return the runs that meet all filters, oldest first.
+
+        Parameters
+        ----------
+        where : sequence of str
+            Filters, as `ensemble.store.filters` takes them.
+
+        Returns
+        -------
+        list of Record
+        """
         query = _RUN.where(*conditions(where, RunRow.document, RUN_FIELDS))
         return self._all(query.order_by(RunRow.created, RunRow.key))
 
     def runs_page(self, where: Sequence[str], after: str | None, limit: int) -> list[Record]:
-        """At most `limit` runs, newest first, from the one that follows run `after`."""
+        """Return a part of the runs that meet all filters, newest first.
+
+        Parameters
+        ----------
+        where : sequence of str
+            Filters, as `ensemble.store.filters` takes them.
+        after : str or None
+            Key of the run before the first one of the part; None for the newest runs.
+        limit : int
+            How many runs at most.
+
+        Returns
+        -------
+        list of Record
+        """
         query = _RUN.where(*conditions(where, RunRow.document, RUN_FIELDS))
         if after is not None:
             last = select(RunRow.created, RunRow.key).where(RunRow.key == after).scalar_subquery()
@@ -157,7 +211,12 @@ class Catalog:
         return self._all(query.order_by(RunRow.created.desc(), RunRow.key.desc()).limit(limit))
 
     def put_boundary(self, boundary: Boundary) -> None:
-        """Insert a boundary, or replace the one of the same study."""
+        """Insert a boundary, or replace the one of the same study.
+
+        Parameters
+        ----------
+        boundary : Boundary
+        """
         row = {
             "study_key": boundary.study_key,
             "updated": timestamp_text(boundary.updated),
@@ -168,16 +227,50 @@ class Catalog:
             connection.execute(insert(BoundaryRow), row)
 
     def boundary(self, study_key: str) -> Record | None:
-        """Boundary of one study, None if there is none."""
+        """Return the boundary of a study as it was recorded.
+
+        Parameters
+        ----------
+        study_key : str
+
+        Returns
+        -------
+        Record or None
+            None if there is no such boundary.
+        """
         return self._one(_ONE_BOUNDARY, study_key)
 
     def boundaries(self, where: Sequence[str]) -> list[Record]:
-        """Boundaries that meet all filters, the longest unchanged first."""
+        """Return the boundaries that meet all filters, the longest unchanged first.
+
+        Parameters
+        ----------
+        where : sequence of str
+            Filters, as `ensemble.store.filters` takes them.
+
+        Returns
+        -------
+        list of Record
+        """
         query = _BOUNDARY.where(*conditions(where, BoundaryRow.document, BOUNDARY_FIELDS))
         return self._all(query.order_by(BoundaryRow.updated, BoundaryRow.study_key))
 
     def boundaries_page(self, where: Sequence[str], after: str | None, limit: int) -> list[Record]:
-        """At most `limit` boundaries by ascending key, from the one that follows study `after`."""
+        """Return a part of the boundaries that meet all filters, by ascending key.
+
+        Parameters
+        ----------
+        where : sequence of str
+            Filters, as `ensemble.store.filters` takes them.
+        after : str or None
+            Key of the study before the first one of the part; None to begin.
+        limit : int
+            How many boundaries at most.
+
+        Returns
+        -------
+        list of Record
+        """
         # By key and not by time: a boundary that changes while somebody turns pages stays in its place.
         query = _BOUNDARY.where(*conditions(where, BoundaryRow.document, BOUNDARY_FIELDS))
         if after is not None:

@@ -22,9 +22,19 @@ RESULT_PACKAGES = (DISTRIBUTION, "numpy", "scipy", "numba")
 class RunSummary(BaseModel):
     """Everything about a run except its arrays.  Its JSON is the attributes of the run's files.
 
-    Results have the names, units and None of `solver.analysis.run.Run`; `series` and `vesicle_series` name
-    the recorded diagnostics, `versions` the packages that the numbers depend on.  `results_revision` is the
-    solver's `RESULTS_REVISION`; None in records from before it was counted.
+    All results have the names and units that they have in `solver.analysis.run.Run`, and are None where they
+    are None there.
+
+    Attributes
+    ----------
+    key : str
+    created : datetime
+    versions : dict of str to str
+        Of the packages that the numbers depend on.
+    results_revision : int or None
+        The solver's `RESULTS_REVISION`; None in records from before there was one.
+    series, vesicle_series : tuple of str
+        Names of the recorded diagnostics.
     """
 
     # Strings keep NaN and infinity, which a failed run may carry, inside the JSON standard.
@@ -60,7 +70,16 @@ class RunSummary(BaseModel):
 
     @classmethod
     def of(cls, run: Run) -> Self:
-        """Summarize a run that this process has just finished."""
+        """Summarize a run that this process has just finished.
+
+        Parameters
+        ----------
+        run : Run
+
+        Returns
+        -------
+        RunSummary
+        """
         results = {name: getattr(run, name) for name in RESULTS}
         versions = {package: version(package) for package in RESULT_PACKAGES}
         return cls(
@@ -80,7 +99,13 @@ RESULTS = tuple(name for name in RunSummary.model_fields if name not in _OTHERS)
 
 
 class NamedArray(NamedTuple):
-    """Values and the names of their dimensions."""
+    """An array and the names of its dimensions.
+
+    Attributes
+    ----------
+    dimensions : tuple of str
+    values : array
+    """
 
     dimensions: tuple[str, ...]
     values: Array
@@ -96,7 +121,16 @@ FRAME_DIMENSIONS: Mapping[str, tuple[str, ...]] = {
 
 
 def arrays(run: Run) -> dict[str, NamedArray]:
-    """Arrays of a run by name: diagnostics over `time`, then the frames over `frame_time`."""
+    """Return the arrays of a run by name: diagnostics over `time`, then the frames over `frame_time`.
+
+    Parameters
+    ----------
+    run : Run
+
+    Returns
+    -------
+    dict of str to NamedArray
+    """
     frames = {
         "frame_time": run.frames.time,
         "tangent_angle": run.frames.tangent_angle,
@@ -116,7 +150,18 @@ def arrays(run: Run) -> dict[str, NamedArray]:
 
 
 def rebuild(summary: RunSummary, read: Callable[[str], Array]) -> Run:
-    """Put a run together again from its summary and a function that reads an array by name."""
+    """Put a run together again.
+
+    Parameters
+    ----------
+    summary : RunSummary
+    read : callable
+        Reads an array by name.
+
+    Returns
+    -------
+    Run
+    """
     return Run(
         **{name: getattr(summary, name) for name in RESULTS},
         series={name: read(name) for name in summary.series},

@@ -34,7 +34,7 @@ BUSY_SECONDS = 60
 
 Journal = Literal["wal", "delete"]
 
-# What is raised where a URL is none, its driver is missing, or the database does not answer.
+# What is raised where a URL is invalid, its driver is missing, or the database does not answer.
 UNUSABLE = (ArgumentError, NoSuchModuleError, ModuleNotFoundError, DBAPIError)
 
 
@@ -47,7 +47,15 @@ class DatabaseSettings(BaseSettings):
 
 
 class Place(BaseModel):
-    """Where the catalog of a store is: a schema of a database, which only a server has, and its URL."""
+    """Where the catalog of a store is.
+
+    Attributes
+    ----------
+    url : str
+        Of the database.
+    schema_name : str or None
+        Schema in the database of a server; None in a file.
+    """
 
     model_config = ConfigDict(frozen=True)
 
@@ -56,7 +64,17 @@ class Place(BaseModel):
 
     @classmethod
     def of(cls, store: Path) -> Self:
-        """Read where a store, or what is to become one, has its catalog."""
+        """Read where a store, or a directory that becomes one, has its catalog.
+
+        Parameters
+        ----------
+        store : Path
+            Directory of the store.
+
+        Returns
+        -------
+        Place
+        """
         kept = store / PLACE
         if kept.exists():
             return cls.model_validate_json(kept.read_bytes())
@@ -64,14 +82,30 @@ class Place(BaseModel):
 
     @classmethod
     def choose(cls, store: Path) -> Self:
-        """Decide where a new store has its catalog."""
+        """Decide where a new store has its catalog.
+
+        Parameters
+        ----------
+        store : Path
+            Directory of the store.
+
+        Returns
+        -------
+        Place
+        """
         url = DatabaseSettings().database
         if url is None or is_file(url) or (store / PLACE).exists():
             return cls.of(store)
         return cls(url=url, schema_name=f"store_{secrets.token_hex(8)}")
 
     def keep(self, store: Path) -> None:
-        """Have a new store find its catalog again."""
+        """Write down where a new store has its catalog.
+
+        Parameters
+        ----------
+        store : Path
+            Directory of the store.
+        """
         if self != self.of(store):
             _write_secretly(store / PLACE, self.model_dump_json())
 
@@ -86,12 +120,30 @@ def _write_secretly(path: Path, text: str) -> None:
 
 
 def sqlite_url(path: Path) -> str:
-    """URL of an SQLite file."""
+    """Return the URL of an SQLite file.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    str
+    """
     return URL.create("sqlite", database=str(path)).render_as_string()
 
 
 def is_file(url: str) -> bool:
-    """Tell whether a URL is that of a file, which every look-up finds at once, or of a server."""
+    """Tell whether a URL is that of an SQLite file, or of a server.
+
+    Parameters
+    ----------
+    url : str
+
+    Returns
+    -------
+    bool
+    """
     return make_url(url).get_backend_name() == "sqlite"
 
 
@@ -105,6 +157,10 @@ def engine(url: str, journal: Journal = "wal") -> Engine:
     journal : str
         How an SQLite file keeps commits whole.  With ``"wal"`` readers wait for no writer, but the file must
         be used from one machine only, and readers leave files beside it.  With ``"delete"`` neither holds.
+
+    Returns
+    -------
+    Engine
     """
     if not is_file(url):
         return create_engine(url, pool_pre_ping=True)
@@ -122,6 +178,10 @@ def reading_engine(url: str) -> Engine:
     ----------
     url : str
         Of an SQLite file or a server.
+
+    Returns
+    -------
+    Engine
     """
     path = make_url(url).database if is_file(url) else None
     if path is None:
@@ -177,5 +237,14 @@ def _durable(journal: Journal, connection: DBAPIConnection, _: ConnectionPoolEnt
 
 
 def reason(error: BaseException) -> str:
-    """Say on one line why a database cannot be used."""
+    """Say on one line why a database cannot be used.
+
+    Parameters
+    ----------
+    error : exception
+
+    Returns
+    -------
+    str
+    """
     return str(getattr(error, "orig", None) or error).splitlines()[0]

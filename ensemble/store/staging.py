@@ -32,7 +32,13 @@ _NAME = re.compile(r"[0-9a-f]{32}")  # of directories that this module makes
 
 @dataclass(frozen=True)
 class Staged:
-    """A run that is written but not committed.  It may be sent to the process that commits it."""
+    """A run that is written but not committed.  It may be sent to the process that commits it.
+
+    Attributes
+    ----------
+    directory : Path
+    summary : RunSummary
+    """
 
     directory: Path
     summary: RunSummary
@@ -136,6 +142,10 @@ def is_own_directory(path: Path) -> bool:
     ----------
     path : Path
         An entry of `runs/`, of `staging/` or of a writer's directory.  Links do not count.
+
+    Returns
+    -------
+    bool
     """
     return bool(_NAME.fullmatch(path.name)) and path.is_dir() and not path.is_symlink()
 
@@ -148,10 +158,10 @@ def abandoned(staging: Path) -> Iterator[Path]:
     staging : Path
         The directory `staging/` of a store, whose lock the caller holds.
 
-    Yields
-    ------
-    Path
-        A directory that a writer made.  Everything else in `staging/` is left alone.
+    Returns
+    -------
+    iterator of Path
+        Directories that writers made.  Everything else in `staging/` is left alone.
     """
     return (entry for entry in staging.iterdir() if is_own_directory(entry) and _has_no_writer(entry))
 

@@ -1,7 +1,7 @@
 """The store as its users see it.
 
-What reads and writes arrays is imported by the methods that do so: it takes long, and most who open a store
-want its catalog.
+The modules that read and write arrays are imported by the methods that need them.  Their import takes long,
+and most users of a store need only its catalog.
 """
 
 from __future__ import annotations
@@ -68,6 +68,10 @@ class Store(AbstractContextManager["Store"]):
         path : Path
             The directory.
 
+        Returns
+        -------
+        Store
+
         Raises
         ------
         StoreInputError
@@ -93,6 +97,10 @@ class Store(AbstractContextManager["Store"]):
         ----------
         path : Path
             The directory.
+
+        Returns
+        -------
+        Store
 
         Raises
         ------
@@ -124,11 +132,15 @@ class Store(AbstractContextManager["Store"]):
             A finished run.
         summary : RunSummary, optional
             Of a run that another store has.
+
+        Returns
+        -------
+        Staged
         """
         return self._staging.stage(run, summary)
 
     def commit(self, staged: Staged) -> str:
-        """Make a staged run exist, and return its key.
+        """Commit a staged run: from then on it exists.
 
         If the key exists already, that run stays and the staged copy is removed.  While the database or the
         disk does not answer the commit is tried again for `COMMIT_SECONDS`.
@@ -137,6 +149,11 @@ class Store(AbstractContextManager["Store"]):
         ----------
         staged : Staged
             From `stage`, of this process or another one.
+
+        Returns
+        -------
+        str
+            Key of the run.
 
         Raises
         ------
@@ -175,7 +192,7 @@ class Store(AbstractContextManager["Store"]):
         return staged.key
 
     def save(self, run: Run, summary: RunSummary | None = None) -> str:
-        """Stage and commit a run, and return its key.
+        """Stage and commit a run.
 
         Parameters
         ----------
@@ -183,6 +200,11 @@ class Store(AbstractContextManager["Store"]):
             A finished run.
         summary : RunSummary, optional
             Of a run that another store has.
+
+        Returns
+        -------
+        str
+            Key of the run.
         """
         return self.commit(self.stage(run, summary))
 
@@ -292,16 +314,43 @@ class Store(AbstractContextManager["Store"]):
         return place
 
     def contains(self, key: str) -> bool:
-        """Tell whether a run is committed."""
+        """Tell whether a run is committed.
+
+        Parameters
+        ----------
+        key : str
+
+        Returns
+        -------
+        bool
+        """
         return self._catalog.run(key) is not None
 
     def outcome(self, key: str) -> Outcome | None:
-        """Outcome of a committed run, None if there is none."""
+        """Return the outcome of a committed run.
+
+        Parameters
+        ----------
+        key : str
+
+        Returns
+        -------
+        Outcome or None
+            None if there is no such run.
+        """
         record = self._catalog.run(key)
         return None if record is None else Outcome(json.loads(record.json)["outcome"])
 
     def summary(self, key: str) -> RunSummary:
-        """Everything about a committed run except its arrays.
+        """Return everything about a committed run except its arrays.
+
+        Parameters
+        ----------
+        key : str
+
+        Returns
+        -------
+        RunSummary
 
         Raises
         ------
@@ -311,7 +360,15 @@ class Store(AbstractContextManager["Store"]):
         return _validated(RunSummary, "run", self.run_record(key))
 
     def run_record(self, key: str) -> Record:
-        """What `summary` reads, as it was recorded.
+        """Return the summary of a committed run as it was recorded.
+
+        Parameters
+        ----------
+        key : str
+
+        Returns
+        -------
+        Record
 
         Raises
         ------
@@ -325,6 +382,14 @@ class Store(AbstractContextManager["Store"]):
 
     def load(self, key: str) -> Run:
         """Read a committed run; every number has the bits that were saved.
+
+        Parameters
+        ----------
+        key : str
+
+        Returns
+        -------
+        Run
 
         Raises
         ------
@@ -340,7 +405,7 @@ class Store(AbstractContextManager["Store"]):
         return read_run(self._runs / key)
 
     def summaries(self, where: Sequence[str] = ()) -> list[RunSummary]:
-        """Summaries of the runs that meet all filters, oldest first.
+        """Return the summaries of the runs that meet all filters, oldest first.
 
         A record that this version cannot read is left out, with a warning that names it.
 
@@ -350,17 +415,21 @@ class Store(AbstractContextManager["Store"]):
             Filters ``path op value`` over the scene (``flow.rate>=0.5``, ``vesicles.0.reduced_area=0.9``,
             ``adhesion=null``) and the results (``outcome!=bound``, ``viscosity.total<2``).
 
+        Returns
+        -------
+        list of RunSummary
+
         Raises
         ------
         StoreInputError
-            If a filter is malformed, or its field or value is none.
+            If a filter is malformed, its field is unknown, or the value does not have its type.
         """
         return _readable(RunSummary, "run", self._catalog.runs(where))
 
     def runs_page(
         self, where: Sequence[str] = (), after: str | None = None, limit: int = 100
     ) -> list[Record]:
-        """A part of what `summaries` finds, newest first, as it was recorded.
+        """Return a part of the runs that meet all filters, newest first, as they were recorded.
 
         Parameters
         ----------
@@ -371,47 +440,82 @@ class Store(AbstractContextManager["Store"]):
         limit : int
             How many runs at most.
 
+        Returns
+        -------
+        list of Record
+
         Raises
         ------
         StoreInputError
-            If a filter is malformed, its field or value is none, or there is no run `after`.
+            If a filter is malformed, its field is unknown, the value does not have its type, or there is no
+            run ``after``.
         """
         if after is not None and not self.contains(after):
             raise StoreInputError(f"after: there is no run {after}")
         return self._catalog.runs_page(where, after, limit)
 
     def save_boundary(self, boundary: Boundary) -> None:
-        """Insert a boundary, or replace the one of the same study, at once."""
+        """Insert a boundary, or replace the one of the same study, in one step.
+
+        Parameters
+        ----------
+        boundary : Boundary
+        """
         with locked(self._lock):
             self._catalog.put_boundary(boundary)
 
     def boundaries(self, where: Sequence[str] = ()) -> list[Boundary]:
-        """Boundaries that meet all filters, such as ``name=critical-hamaker``; the latest change last.
+        """Return the boundaries that meet all filters; the latest change last.
+
+        Parameters
+        ----------
+        where : sequence of str
+            Filters, such as ``name=critical-hamaker``.
+
+        Returns
+        -------
+        list of Boundary
 
         Raises
         ------
         StoreInputError
-            If a filter is malformed, or its field or value is none.
+            If a filter is malformed, its field is unknown, or the value does not have its type.
         """
         return _readable(Boundary, "boundary", self._catalog.boundaries(where))
 
     def boundary(self, study_key: str) -> Boundary:
-        """Boundary of one study.
+        """Return the boundary of a study.
+
+        Parameters
+        ----------
+        study_key : str
+
+        Returns
+        -------
+        Boundary
 
         Raises
         ------
         NotStored
-            If there is none.
+            If there is no such boundary.
         """
         return _validated(Boundary, "boundary", self.boundary_record(study_key))
 
     def boundary_record(self, study_key: str) -> Record:
-        """What `boundary` reads, as it was recorded.
+        """Return the boundary of a study as it was recorded.
+
+        Parameters
+        ----------
+        study_key : str
+
+        Returns
+        -------
+        Record
 
         Raises
         ------
         NotStored
-            If there is none.
+            If there is no such boundary.
         """
         record = self._catalog.boundary(study_key)
         if record is None:
@@ -421,7 +525,7 @@ class Store(AbstractContextManager["Store"]):
     def boundaries_page(
         self, where: Sequence[str] = (), after: str | None = None, limit: int = 100
     ) -> list[Record]:
-        """A part of what `boundaries` finds, by ascending key, as it was recorded.
+        """Return a part of the boundaries that meet all filters, by ascending key, as they were recorded.
 
         Parameters
         ----------
@@ -432,10 +536,14 @@ class Store(AbstractContextManager["Store"]):
         limit : int
             How many boundaries at most.
 
+        Returns
+        -------
+        list of Record
+
         Raises
         ------
         StoreInputError
-            If a filter is malformed, or its field or value is none.
+            If a filter is malformed, its field is unknown, or the value does not have its type.
         """
         return self._catalog.boundaries_page(where, after, limit)
 
