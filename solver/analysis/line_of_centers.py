@@ -35,7 +35,7 @@ class LineOfCenters(RevolutionTracker):
         more.
     """
 
-    ambiguity = 2 * np.pi
+    direction_period = 2 * np.pi
 
     def __init__(self, membranes: Membranes, state: Array, separated_distance: float) -> None:
         super().__init__(membranes, state)

@@ -28,8 +28,8 @@ class RevolutionTracker(ABC):
 
     Attributes
     ----------
-    ambiguity : float
-        Angle by which the line may be rotated without a difference: 2π, or π without a direction.
+    direction_period : float
+        Rotation after which the line is the same: 2π, or π for a line without a head.
     angle : float
         At the end of the last step; radians, unwrapped.
     half_turns : list of float
@@ -38,7 +38,7 @@ class RevolutionTracker(ABC):
         Those of the steps.  Set it when the number of points changes.
     """
 
-    ambiguity: float
+    direction_period: float
 
     def __init__(self, membranes: Membranes, state: Array) -> None:
         self.membranes = membranes
@@ -47,7 +47,7 @@ class RevolutionTracker(ABC):
 
     @abstractmethod
     def _direction(self, state: Array) -> float:
-        """Return the angle of the line, up to the ambiguity."""
+        """Return the angle of the line, up to multiples of the period."""
 
     def advance(self, step: Step) -> Step:
         """Follow one step.
@@ -73,7 +73,7 @@ class RevolutionTracker(ABC):
         Parameters
         ----------
         state : (state_size,)
-            Its angle differs from that of the last step by less than half the ambiguity.
+            Its angle differs from that of the last step by less than half the direction's period.
 
         Returns
         -------
@@ -81,7 +81,7 @@ class RevolutionTracker(ABC):
             Radians, unwrapped.
         """
         angle = self._direction(state)
-        return angle + self.ambiguity * round((self.angle - angle) / self.ambiguity)
+        return angle + self.direction_period * round((self.angle - angle) / self.direction_period)
 
     @property
     def period(self) -> float | None:
@@ -96,7 +96,7 @@ class RevolutionTracker(ABC):
 class LongAxisTracker(RevolutionTracker):
     """Follows the long principal axis of a single vesicle, a line without a direction."""
 
-    ambiguity = np.pi
+    direction_period = np.pi
 
     def _direction(self, state: Array) -> float:
         membranes = self.membranes

@@ -120,5 +120,9 @@ class ImposedFlow(Model, ABC):
         ----------
         period : float
             Duration of a full turn, in units of time.
+
+        Returns
+        -------
+        float or None
         """
         return None

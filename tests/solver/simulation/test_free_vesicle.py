@@ -54,16 +54,16 @@ def quarter(unknowns: Array) -> Array:
 
 @cache
 def curvature_energies() -> dict[float, float]:
-    """∫κ² ds by reduced area, each shape found from the one before."""
-    found = {}
+    """∫κ² ds by reduced area, each shape computed from the one before."""
+    energies = {}
     unknowns = np.array([1.4, -2.5, 3.0])  # a circle, slightly bent
     for reduced_area in REDUCED_AREAS:
         misses = lambda u, wanted=reduced_area: quarter(u)[:3] - [0, 0, wanted]  # noqa: E731
         solution = root(misses, unknowns, tol=1e-13)
         unknowns = solution.x
         assert np.max(np.abs(misses(unknowns))) < 1e-12
-        found[reduced_area] = float(quarter(unknowns)[3])
-    return found
+        energies[reduced_area] = float(quarter(unknowns)[3])
+    return energies
 
 
 def test_the_shooting_reproduces_published_values() -> None:
@@ -98,13 +98,13 @@ def test_a_slender_vesicle_relaxes_to_the_euler_lagrange_shape(reduced_area: flo
         vesicles=(Vesicle(reduced_area=reduced_area),),
         numerics=Numerics(points=points, tolerance=1e-8),
     )
-    dynamics = DenseEquation.of(scene)
+    equation = DenseEquation.of(scene)
     blunt = of_reduced_area(ellipse_tangent_angle(0.55, 2 * np.pi, 0.0, points), reduced_area)
-    state = dynamics.membranes.pack(blunt[None], np.zeros((1, 2)))
-    problem = InitialValueProblem(dynamics, state, 0.0, scene.horizon)
+    state = equation.membranes.pack(blunt[None], np.zeros((1, 2)))
+    problem = InitialValueProblem(equation, state, 0.0, scene.horizon)
     integrator = integrator_for(problem, scene.numerics, 1)
     step = integrator.step()
     while step.end < scene.horizon:
         step = integrator.step()
-    energy = dynamics.bending.energy(dynamics.motion(step.state).geometry)
+    energy = equation.bending.energy(equation.motion(step.state).geometry)
     assert 2 * energy == pytest.approx(curvature_energies()[reduced_area], rel=1e-8)

@@ -42,7 +42,7 @@ def fixed(scene: Scene, points: int, tolerance: float = 1e-4) -> Scene:
     return scene.model_copy(update={"numerics": Numerics(points=points, tolerance=tolerance)})
 
 
-def alone(reduced_area: float, **fields: Any) -> Scene:
+def single(reduced_area: float, **fields: Any) -> Scene:
     return Scene(horizon=1.0, vesicles=(Vesicle(reduced_area=reduced_area, **fields),))
 
 
@@ -103,20 +103,20 @@ def scripted(monkeypatch: pytest.MonkeyPatch, points: int, raises: Mapping[float
 
 
 def test_slender_vesicles_get_more_points() -> None:
-    points = [first_points(alone(reduced_area)) for reduced_area in (1.0, 0.9, 0.7, 0.5, 0.4, 0.3)]
+    points = [first_points(single(reduced_area)) for reduced_area in (1.0, 0.9, 0.7, 0.5, 0.4, 0.3)]
     assert points[0] == LADDER[0]
     assert points == sorted(points)
     assert points[-1] >= 4 * points[1]
 
 
 def test_tighter_tolerances_get_more_points() -> None:
-    points = [first_points(alone(0.6), tolerance) for tolerance in (1e-2, 1e-4, 1e-6, 1e-8, 1e-11)]
+    points = [first_points(single(0.6), tolerance) for tolerance in (1e-2, 1e-4, 1e-6, 1e-8, 1e-11)]
     assert all(earlier < later for earlier, later in pairwise(points))
 
 
 def test_the_most_slender_vesicle_decides() -> None:
     vesicles = (Vesicle(reduced_area=0.95, center=(-2.0, 0.0)), Vesicle(reduced_area=0.4, center=(2.0, 0.0)))
-    assert first_points(Scene(horizon=1.0, vesicles=vesicles)) == first_points(alone(0.4))
+    assert first_points(Scene(horizon=1.0, vesicles=vesicles)) == first_points(single(0.4))
 
 
 def test_where_adhesion_acts_close_vesicles_get_more_points() -> None:
@@ -134,7 +134,7 @@ def test_a_short_adhesion_distance_gets_more_points_from_afar() -> None:
 
 
 def test_the_ladder_has_an_end() -> None:
-    assert first_points(alone(0.1)) == LADDER[-1]
+    assert first_points(single(0.1)) == LADDER[-1]
 
 
 # Judging a state.
@@ -151,8 +151,8 @@ def rough(scene: Scene, points: int, amplitude: float) -> tuple[Membranes, Array
 
 
 def test_what_persists_weighs_more_than_what_the_start_has() -> None:
-    resolution = AdaptiveResolution(adaptive(alone(1.0)))
-    membranes, state = rough(alone(1.0), 64, 1e-3)
+    resolution = AdaptiveResolution(adaptive(single(1.0)))
+    membranes, state = rough(single(1.0), 64, 1e-3)
     assert resolution.finer(membranes, 0.0, state) is None
     assert resolution.finer(membranes, 1e-5, state) is None
     assert resolution.finer(membranes, 10.0, state) == 96
@@ -161,13 +161,13 @@ def test_what_persists_weighs_more_than_what_the_start_has() -> None:
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-4, 1e-6])
 def test_a_tighter_tolerance_allows_less_of_a_tail(tolerance: float) -> None:
     allowed = 0.04 * tolerance ** (2 / 3)  # from `spatial_error`: 100·tail^1.5 ≤ tolerance
-    resolution = AdaptiveResolution(adaptive(alone(1.0), tolerance))
-    assert resolution.finer(*_at(10.0, rough(alone(1.0), 64, allowed))) is None
-    assert resolution.finer(*_at(10.0, rough(alone(1.0), 64, 1.5 * allowed))) == 96
+    resolution = AdaptiveResolution(adaptive(single(1.0), tolerance))
+    assert resolution.finer(*_at(10.0, rough(single(1.0), 64, allowed))) is None
+    assert resolution.finer(*_at(10.0, rough(single(1.0), 64, 1.5 * allowed))) == 96
 
 
-def _at(time: float, found: tuple[Membranes, Array]) -> tuple[Membranes, float, Array]:
-    return found[0], time, found[1]
+def _at(time: float, start: tuple[Membranes, Array]) -> tuple[Membranes, float, Array]:
+    return start[0], time, start[1]
 
 
 def test_what_changes_fast_is_soon_judged_as_lasting() -> None:
@@ -175,9 +175,9 @@ def test_what_changes_fast_is_soon_judged_as_lasting() -> None:
     verdicts = []
     for fields in ({}, {"flow": Shear(rate=100.0)}):
         for modulus in (0.01, 100.0):
-            scene = alone(1.0, bending_modulus=modulus).model_copy(update=fields)
-            found = rough(scene, 64, 1e-3)
-            verdicts.append(AdaptiveResolution(adaptive(scene)).finer(*_at(0.1, found)))
+            scene = single(1.0, bending_modulus=modulus).model_copy(update=fields)
+            start = rough(scene, 64, 1e-3)
+            verdicts.append(AdaptiveResolution(adaptive(scene)).finer(*_at(0.1, start)))
     assert verdicts == [None, 96, 96, 96]
 
 
@@ -193,15 +193,15 @@ def test_past_the_ladder_a_rough_state_is_accepted_and_a_gap_too_small_refused()
 
 
 def test_a_fixed_number_is_never_raised() -> None:
-    resolution = resolution_of(fixed(alone(0.3), 32))
+    resolution = resolution_of(fixed(single(0.3), 32))
     assert isinstance(resolution, FixedResolution)
     assert resolution.points == 32
-    assert resolution.finer(*_at(10.0, rough(alone(0.3), 32, 0.5))) is None
+    assert resolution.finer(*_at(10.0, rough(single(0.3), 32, 0.5))) is None
 
 
 def test_membranes_need_a_number_of_points() -> None:
     with pytest.raises(ValueError, match="'auto'"):
-        DenseEquation.of(adaptive(alone(0.9)))
+        DenseEquation.of(adaptive(single(0.9)))
 
 
 # Whole runs.
@@ -235,7 +235,7 @@ def test_frames_of_all_parts_have_the_last_number_of_points(monkeypatch: pytest.
     np.testing.assert_allclose(frames.time, [0, 1, 2, 3], atol=1e-12)
     assert frames.tangent_angle.shape == frames.tension.shape == (4, 2, 96)
     np.testing.assert_allclose(frames.center, expected.center, rtol=0, atol=2e-5)
-    # Points glide by a sum over them, which differs a little: curves are compared by their second moments.
+    # Points move along by a sum over them, which differs a little: second moments compare the curves.
     np.testing.assert_allclose(_moments(scene, frames), _moments(scene, expected), rtol=0, atol=1e-4)
     np.testing.assert_allclose(frames.tension.mean(axis=2), expected.tension.mean(axis=2), rtol=1e-3)
 
@@ -256,8 +256,8 @@ def test_the_work_of_all_parts_adds_up(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(DenseEquation, "of", of)
     script = scripted(monkeypatch, 32, {0.5: 48, 1.0: 64})
     run = simulate(fixed(shear_pair(1.5, **fixed_horizon(2.0)), 32))
-    assert [dynamics.membranes.points for dynamics in made] == [32, 48, 64]
-    assert run.work.rhs_evaluations == sum(dynamics.evaluations + dynamics.recordings for dynamics in made)
+    assert [equation.membranes.points for equation in made] == [32, 48, 64]
+    assert run.work.rhs_evaluations == sum(equation.evaluations + equation.recordings for equation in made)
     assert run.work.jacobian_evaluations >= 3
     assert run.work.factorizations > 3
     assert run.work.steps == len(script.judged) - 2

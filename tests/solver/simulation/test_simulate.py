@@ -277,16 +277,16 @@ def test_a_run_that_does_not_fail_has_no_reason() -> None:
 
 
 def test_the_caller_can_stop_a_run() -> None:
-    seen: list[tuple[float, float]] = []
+    calls: list[tuple[float, float]] = []
 
     def progress(time: float, horizon: float) -> None:
-        seen.append((time, horizon))
+        calls.append((time, horizon))
 
     with pytest.raises(Cancelled):
-        simulate(shear_pair(1.5), should_stop=lambda: len(seen) >= 5, on_progress=progress)
-    assert len(seen) == 5
-    assert all(earlier[0] < later[0] for earlier, later in pairwise(seen))
-    assert seen[0][1] == 400.0  # the horizon with its extensions
+        simulate(shear_pair(1.5), should_stop=lambda: len(calls) >= 5, on_progress=progress)
+    assert len(calls) == 5
+    assert all(earlier[0] < later[0] for earlier, later in pairwise(calls))
+    assert calls[0][1] == 400.0  # the horizon with its extensions
 
 
 def test_the_caller_can_stop_the_relaxation() -> None:

@@ -32,7 +32,7 @@ def test_weak_adhesion_separates() -> None:
     assert run.viscosity is None
 
 
-def turned(run: Run) -> Array:
+def rotation(run: Run) -> Array:
     """By how much the line of centers has turned."""
     angle = run.series["center_angle"]
     return np.abs(angle - angle[0])
@@ -41,8 +41,8 @@ def turned(run: Run) -> Array:
 def test_strong_adhesion_binds_after_the_revolution_that_the_scene_asks_for() -> None:
     run, last_step = followed(shear_pair(3.5))
     assert run.outcome is Outcome.BOUND
-    assert turned(run)[-1] >= 2 * np.pi
-    assert np.all(turned(run)[run.series["time"] <= last_step] < 2 * np.pi)
+    assert rotation(run)[-1] >= 2 * np.pi
+    assert np.all(rotation(run)[run.series["time"] <= last_step] < 2 * np.pi)
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +63,7 @@ def test_the_viscosity_is_the_average_over_the_last_turn(bound: Run) -> None:
     assert bound.viscosity
     assert bound.period
     time = bound.series["time"]
-    end = CubicSpline(turned(bound), time)(2 * np.pi)
+    end = CubicSpline(rotation(bound), time)(2 * np.pi)
     fine = np.linspace(end - bound.period, end, 4001)
     for name, value in (
         ("viscosity_bending_tension", bound.viscosity.bending_tension),
