@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import inspect
 import math
+import textwrap
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -37,6 +40,7 @@ COMMON: dict[str, Any] = {"hamaker": 1.5, "distance": DISTANCE}
 
 
 def morse(square: float, parameters: tuple[float, float]) -> Derivatives:
+    """Return φ/H and its first and second derivative by r²."""
     distance, steepness = parameters
     r = math.sqrt(square)
     attraction = math.exp(-steepness * (r - distance))
@@ -47,7 +51,7 @@ def morse(square: float, parameters: tuple[float, float]) -> Derivatives:
 
 
 class Morse(PairPotential):
-    """φ = H[exp(−2a(r − δ)) − 2 exp(−a(r − δ))] with the steepness a, as someone might add it."""
+    """φ = H[exp(−2a(r − δ)) − 2 exp(−a(r − δ))] with the steepness a."""
 
     kind: Literal["morse"] = "morse"
     steepness: Positive = 4.0
@@ -59,6 +63,12 @@ class Morse(PairPotential):
     @property
     def parameters(self) -> tuple[float, float]:
         return self.distance, self.steepness
+
+
+def test_the_guide_adds_this_potential() -> None:
+    guide = (Path(__file__).parents[3] / "solver" / "README.md").read_text(encoding="utf-8")
+    for part in (morse, Morse):
+        assert textwrap.indent(inspect.getsource(part), "   ") in guide
 
 
 @pytest.fixture

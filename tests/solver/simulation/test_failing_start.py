@@ -8,7 +8,7 @@ import pytest
 from solver.analysis.run import LARGEST_SPATIAL, Outcome, Run
 from solver.membrane.geometry import Geometry, Membranes
 from solver.potentials.proximity import gap
-from solver.scene import Adhesion, Numerics, Scene, Shear, Start, Trap, Vesicle
+from solver.scene import Numerics, PowerLaw, Scene, Shear, Start, Trap, Vesicle
 from solver.simulation.initial_state import initial_ellipses
 from solver.simulation.simulate import simulate
 
@@ -52,7 +52,7 @@ def test_a_single_vesicle(contrast: float) -> None:
 def pair(**fields: object) -> Scene:
     """With images, or without: unequal bending moduli."""
     vesicles = (slender(center=(-1.5, 0.0)), slender(center=(1.5, 0.0)))
-    defaults = {"horizon": 1.0, "vesicles": vesicles, "adhesion": Adhesion(hamaker=1.0, distance=0.4)}
+    defaults = {"horizon": 1.0, "vesicles": vesicles, "adhesion": PowerLaw(hamaker=1.0, distance=0.4)}
     return Scene.model_validate(defaults | fields)
 
 
