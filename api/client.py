@@ -165,8 +165,8 @@ class Client(AbstractContextManager["Client"]):
     """A connection to a service.
 
     Use it as a context manager, or close it. While the service cannot be reached, for example during a
-    restart, requests are repeated for a minute; then `httpx.TransportError` is raised. A service on this machine
-    is reached directly, whatever proxy the environment names; for others the error names the proxy.
+    restart, requests are repeated for a minute; then `httpx.TransportError` is raised. A service on this
+    machine is reached directly, whatever proxy the environment names; for others the error names the proxy.
 
     Parameters
     ----------

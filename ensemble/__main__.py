@@ -1,5 +1,15 @@
-"""`python -m ensemble` is the command line."""
+"""`python -m ensemble` and the command `ensemble` are the command line."""
 
-from ensemble.cli import main
+from ensemble.interrupts import end_with_one_line
 
-main()
+
+def main() -> None:
+    """Run the command line; signals are provided for before anything else is imported."""
+    end_with_one_line()
+    from ensemble.cli import main as run
+
+    run()
+
+
+if __name__ == "__main__":
+    main()

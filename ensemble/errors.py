@@ -33,6 +33,20 @@ class NotStored(StoreInputError):  # noqa: N818
     """The store has no run or boundary with that key."""
 
 
+class Interrupted(BaseException):
+    """A signal asked this process to end.
+
+    Parameters
+    ----------
+    number : int
+        The signal.
+    """
+
+    def __init__(self, number: int) -> None:
+        super().__init__(number)
+        self.status = 128 + number
+
+
 @contextmanager
 def refusing() -> Iterator[None]:
     """Turn errors about unusable input (`ValueError`, `OSError`) into `BadInput`."""

@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import sys
 from importlib.metadata import entry_points
+from io import TextIOWrapper
 from typing import Annotated
 
 import typer
 
 from ensemble.cli import question_commands, report_commands, schema_command, store_commands
-from ensemble.errors import BadInput
+from ensemble.errors import BadInput, EnsembleError, Interrupted
 from ensemble.mpi.world import only_first_rank_speaks, pin_threads
 
 GROUP = "ensemble.commands"  # of entry points: functions that other distributions add as commands
@@ -52,8 +53,15 @@ def _options(
 
 
 def main() -> None:
-    """Run the command line; exit status 2 and one message for bad input."""
+    """Run the command line.
+
+    Bad input ends it with status 2, trouble with the machine or the store with status 1, and a signal with
+    128 and its number; each with one line.
+    """
     pin_threads()
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="replace")  # what a terminal cannot show costs no answer
     for command in entry_points(group=GROUP):
         app.command(command.name)(command.load())
     with only_first_rank_speaks():
@@ -62,6 +70,11 @@ def main() -> None:
         except BadInput as error:
             print(f"ensemble: {error}", file=sys.stderr)
             sys.exit(2)
+        except (EnsembleError, OSError) as error:
+            print(f"ensemble: {error}", file=sys.stderr)
+            sys.exit(1)
+        except Interrupted as interruption:
+            sys.exit(interruption.status)
 
 
 if __name__ == "__main__":

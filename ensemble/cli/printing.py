@@ -5,7 +5,10 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
+from rich.text import Text
+
 if TYPE_CHECKING:
+    from rich.console import RenderableType
     from rich.table import Table
 
 
@@ -21,7 +24,7 @@ def print_json(document: Any) -> None:
 
 
 def print_table(table: Table) -> None:
-    """Print a table, as wide as the terminal.
+    """Print a table as wide as the terminal, or elsewhere as tab-separated values, whole ones.
 
     Parameters
     ----------
@@ -30,4 +33,16 @@ def print_table(table: Table) -> None:
     """
     from rich.console import Console
 
-    Console().print(table)
+    console = Console()
+    if console.is_terminal:
+        console.print(table)
+        return
+    columns = table.columns
+    if table.show_header:
+        print("\t".join(_text(column.header) for column in columns))
+    for row in zip(*(column.cells for column in columns), strict=True):
+        print("\t".join(map(_text, row)))
+
+
+def _text(cell: RenderableType) -> str:
+    return Text.from_markup(cell).plain if isinstance(cell, str) else str(cell)

@@ -13,6 +13,7 @@ import typer
 from ensemble.cli.options import AsJson, Changes, Document, ProgressAs, ProgressFormat, RanksPerRun, StorePath
 from ensemble.cli.printing import print_json, print_table
 from ensemble.config.defaults import DEFAULT_STORE, DEFAULT_STUDY
+from ensemble.mpi.world import launched_rank
 
 if TYPE_CHECKING:
     from ensemble.questions import Answer, Question
@@ -46,6 +47,9 @@ def run(  # numpydoc ignore=PR01
     scene: Document,
     changes: Changes = [],  # noqa: B006
     store: Annotated[Path | None, typer.Option(metavar="DIR", help="Keep the run in this store.")] = None,
+    again: Annotated[
+        bool, typer.Option("--again", help="Make the run although the store has it; that one is set aside.")
+    ] = False,
     ranks_per_run: RanksPerRun = None,
     progress: ProgressAs = ProgressFormat.TEXT,
     as_json: AsJson = False,
@@ -54,10 +58,26 @@ def run(  # numpydoc ignore=PR01
 
     The exit status is 1 if it failed numerically.
     """
+    if again and store is not None and launched_rank() == 0:
+        _set_aside(scene, changes, store)
     answer_and_print("scene", scene, changes, store, ranks_per_run, progress, as_json)
 
 
 COMMANDS = (bisect, run)
+
+
+def _set_aside(scene: str, changes: list[str], path: Path) -> None:
+    """Take the run of a scene out of a store that has it."""
+    from ensemble.config.overrides import parse_override
+    from ensemble.errors import refusing
+    from ensemble.questions import kind_named
+    from ensemble.store import Store
+
+    with refusing():
+        question = kind_named("scene").load(scene, dict(map(parse_override, changes)))
+        with Store.open(path) as store:
+            if store.contains(question.key):
+                store.set_aside(question.key)
 
 
 def answer_and_print(

@@ -1,4 +1,4 @@
-"""Commands that read a store."""
+"""Commands that read, repair and merge stores."""
 
 from __future__ import annotations
 
@@ -83,16 +83,45 @@ def _stored(store: Store, name: str) -> StoredAnswer:
 
 def check(  # numpydoc ignore=PR01
     store: StorePath = DEFAULT_STORE,
+    repair: Annotated[
+        bool,
+        typer.Option(
+            "--repair",
+            help="Rebuild a lost or damaged catalog from the runs, and set damaged runs aside in lost+found.",
+        ),
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """Verify every run and boundary of a store; the exit status is 1 if anything is wrong."""
-    with refusing(), _existing(store) as opened:
-        problems = opened.check()
+    from ensemble.store import Store
+
+    with refusing():
+        done = Store.repair(store) if repair else []
+        with _existing(store) as opened:
+            problems = opened.check()
     if as_json:
-        print_json({"store": str(store), "problems": problems})
+        print_json({"store": str(store), "done": done, "problems": problems})
     else:
-        print("\n".join(problems) or f"{store} is whole")
+        print("\n".join([*done, *problems]) or f"{store} is whole")
     raise typer.Exit(1 if problems else 0)
+
+
+def merge(  # numpydoc ignore=PR01
+    source: Annotated[Path, typer.Argument(metavar="STORE", help="Store whose runs are copied.")],
+    into: Annotated[Path, typer.Option(metavar="DIR", help="Store that takes them.")],
+    as_json: AsJson = False,
+) -> None:
+    """Copy the runs and boundaries of one store into another; of a boundary in both, the newer one stays."""
+    from ensemble.store import Store
+    from ensemble.store.merge import merge as copy
+
+    with refusing(), _existing(source) as opened, Store.open(into) as target:
+        merged = copy(opened, target)
+    if as_json:
+        print_json(merged._asdict())
+    else:
+        copied = f"copied {merged.runs} runs and {merged.boundaries} boundaries"
+        print(f"{copied}; {merged.known_runs} runs were there already")
 
 
 def export(  # numpydoc ignore=PR01
@@ -107,7 +136,7 @@ def export(  # numpydoc ignore=PR01
         export_run(opened.summary(key), opened.load(key), file)
 
 
-COMMANDS = (query, show, check, export)
+COMMANDS = (query, show, check, merge, export)
 
 
 def _existing(path: Path) -> Store:

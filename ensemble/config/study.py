@@ -129,7 +129,7 @@ class Study(Model):
     Attributes
     ----------
     name : str
-        What the study and its boundary are called.
+        What the study and its boundary are called; at most 100 characters.
     scene : Scene
         The scene in which both parameters are varied.
     search : Search
@@ -138,7 +138,8 @@ class Study(Model):
         The values at which it is searched for.
     """
 
-    name: Annotated[str, Field(min_length=1)]
+    # Without control characters: it is shown on terminals and in pages.
+    name: Annotated[str, Field(min_length=1, max_length=100, pattern=r"^[^\x00-\x1f\x7f-\x9f]+$")]
     scene: Scene
     search: Search
     sweep: Sweep

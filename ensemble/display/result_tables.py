@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from rich.markup import escape
 from rich.table import Column, Table
 
 if TYPE_CHECKING:
@@ -84,7 +85,7 @@ def boundary_table(boundary: Boundary) -> Table:
     -------
     Table
     """
-    table = Table(*boundary_columns(boundary.points), title=boundary.name)
+    table = Table(*map(_folded, boundary_columns(boundary.points)), title=escape(boundary.name))
     for point in boundary.points:
         table.add_row(*boundary_cells(point))
     return table
@@ -120,7 +121,7 @@ def runs_table(summaries: Sequence[RunSummary]) -> Table:
     -------
     Table
     """
-    table = Table(_whole("run"), "outcome", "flow", "rate", "hamaker", "revision")
+    table = Table(_whole("run"), *map(_folded, ["outcome", "flow", "rate", "hamaker", "revision"]))
     for summary in summaries:
         flow, adhesion = summary.scene.flow, summary.scene.adhesion
         table.add_row(
@@ -146,18 +147,23 @@ def boundaries_table(boundaries: Sequence[Boundary]) -> Table:
     -------
     Table
     """
-    table = Table(_whole("boundary"), "name", "points", "converged", "certified", "updated")
+    table = Table(_whole("boundary"), *map(_folded, ["name", "points", "converged", "certified", "updated"]))
     for boundary in boundaries:
         converged = sum(point.status == "converged" for point in boundary.points)
         table.add_row(
             boundary.study_key,
-            boundary.name,
+            escape(boundary.name),
             str(len(boundary.points)),
             str(converged),
             str(sum(point.certified for point in boundary.points)),
             f"{boundary.updated:%Y-%m-%d %H:%M:%S}",
         )
     return table
+
+
+def _folded(heading: str) -> Column:
+    # Nothing is cut: what does not fit goes on in the next line.
+    return Column(heading, overflow="fold")
 
 
 def _whole(heading: str) -> Column:

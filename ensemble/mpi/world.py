@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout
 from typing import TYPE_CHECKING, TypeVar
 
-from ensemble.errors import BadInput
+from ensemble.errors import BadInput, EnsembleError, Interrupted
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
@@ -94,7 +94,8 @@ def world() -> Intracomm:
     ------
     BadInput
         If no MPI library can be loaded, if the launcher belongs to another MPI than the library (each
-        process would then silently be a world of its own), or if threads may not call MPI concurrently.
+        process would then silently be a world of its own), if threads may not call MPI concurrently, or if
+        the ranks were started with different arguments.
     """
     launched = launched_size()
     if launched > 1:
@@ -110,7 +111,19 @@ def world() -> Intracomm:
         )
     if MPI.Query_thread() < MPI.THREAD_MULTIPLE:
         raise BadInput("MPI library: it must provide MPI_THREAD_MULTIPLE, and this one does not")
+    _require_same_arguments(MPI.COMM_WORLD)
     return MPI.COMM_WORLD
+
+
+def _require_same_arguments(communicator: Intracomm) -> None:
+    """Refuse ranks that were started with different arguments: only the first rank's would count."""
+    arguments = communicator.allgather(sys.argv[1:])
+    for rank, other in enumerate(arguments):
+        if other != arguments[0]:
+            raise BadInput(
+                f"arguments: rank {rank} has {' '.join(other)!r} and rank 0 {' '.join(arguments[0])!r}; "
+                "all ranks of a job carry out one command, so start a job for each"
+            )
 
 
 def on_root(communicator: Intracomm | None, function: Callable[[], T]) -> T:
@@ -165,7 +178,7 @@ def abort_guard(communicator: Intracomm | None) -> Iterator[None]:
     """End the whole job, with status 1, when an exception leaves the block on this rank.
 
     Otherwise the other ranks would wait for this one for ever.  `BadInput` passes: it comes from `on_root`
-    and leaves the block on every rank.
+    and leaves the block on every rank.  So does `Interrupted`, which is raised only where there is one rank.
 
     Parameters
     ----------
@@ -174,13 +187,16 @@ def abort_guard(communicator: Intracomm | None) -> Iterator[None]:
     """
     try:
         yield
-    except (BadInput, SystemExit):
+    except (BadInput, SystemExit, Interrupted):
         raise
-    except BaseException:
+    except BaseException as error:
         if communicator is None:
             raise
+        # What is wrong with the machine or the store is said in a line; anything else is an error of ours.
+        expected = isinstance(error, EnsembleError | OSError)
+        text = f"ensemble: {error}" if expected else traceback.format_exc()
         # The stream of the process: the command line silences sys.stderr on every rank but the first.
-        print(traceback.format_exc(), file=sys.__stderr__, flush=True)
+        print(text, file=sys.__stderr__, flush=True)
         # The launcher stops forwarding output as soon as it hears of the end.
         time.sleep(_FORWARD_SECONDS)
         communicator.Abort(1)

@@ -1,0 +1,171 @@
+"""Trouble that users' machines have: one line each, nothing lost, nothing wrong in silence."""
+
+from __future__ import annotations
+
+import json
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import psutil
+import pytest
+
+from tests.conftest import ENSEMBLE, QUICK_STUDY
+
+QUICK = ("vesicle-shear", "--set=horizon=1", "--set=numerics.points=32", "--set=numerics.tolerance=1e-3")
+
+
+@pytest.fixture(scope="module")
+def stored_run(
+    ensemble: Callable[..., subprocess.CompletedProcess[str]], tmp_path_factory
+) -> tuple[Path, str]:
+    """A store with a run in it, and the run's key."""
+    store = tmp_path_factory.mktemp("stored") / "store"
+    result = ensemble("run", *QUICK, "--store", str(store), "--json")
+    assert result.returncode == 0, result.stderr
+    return store, json.loads(result.stdout)["run_key"]
+
+
+def test_what_a_terminal_cannot_show_is_replaced(ensemble, finished_study) -> None:
+    result = ensemble(
+        "show",
+        "critical-hamaker",
+        f"--store={finished_study.store}",
+        environment={"PYTHONIOENCODING": "ascii"},
+    )
+    assert result.returncode == 0, result.stderr
+    assert "converged" in result.stdout
+
+
+def test_redirected_tables_hold_whole_values_separated_by_tabs(ensemble, finished_study) -> None:
+    result = ensemble("show", "critical-hamaker", f"--store={finished_study.store}")
+    header, *rows = [line.split("\t") for line in result.stdout.splitlines()]
+    assert header[:4] == ["flow.rate", "critical value", "bracket", "outcomes"]
+    assert len(rows) == 3
+    assert all(len(row) == len(header) for row in rows)
+    assert {row[3] for row in rows} == {"separated | bound"}
+    assert "…" not in result.stdout
+
+
+def test_ranks_with_different_arguments_are_refused(launcher) -> None:
+    """As farms of runs are started that mean something else."""
+    python = [sys.executable, "-m", "ensemble", "run"]
+    command = [launcher.mpirun, "-n", "1", *python, "vesicle-shear", ":", "-n", "1", *python, "doublet-shear"]
+    result = subprocess.run(
+        command, env=launcher.environment, capture_output=True, text=True, timeout=240, check=False
+    )
+    assert result.returncode == 2
+    assert "arguments: rank 1 has 'run doublet-shear' and rank 0 'run vesicle-shear'" in result.stderr
+    assert "Traceback" not in result.stderr
+
+
+def test_a_rank_in_another_directory_uses_the_store_of_the_first(launcher, tmp_path: Path) -> None:
+    """The address of the store is relative, and only the first rank is where it leads to it."""
+    (tmp_path / "elsewhere").mkdir()
+    script = f'[ "$PMI_RANK" = 1 ] && cd {tmp_path}/elsewhere; cd . ; exec "$@"'
+    study = ["bisect", "--set=sweep.values=[0.5]", "--set=scene.numerics.points=32", "--tolerance=0.4"]
+    study += ["--set=scene.numerics.tolerance=1e-3", "--store=relative", "--json"]
+    result = subprocess.run(
+        launcher.command(2, ["sh", "-c", script, "sh", *ENSEMBLE, *study]),
+        env=launcher.environment,
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=240,
+        check=False,
+    )
+    assert result.returncode == 0, result.stderr
+    assert (tmp_path / "relative").is_dir()
+    assert list((tmp_path / "elsewhere").iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["a\nb", "", "x" * 101, "bell\x07"])
+def test_unfit_names_of_studies_are_refused_where_they_enter(ensemble, tmp_path: Path, name: str) -> None:
+    result = ensemble("bisect", f"--set=name={json.dumps(name)}", f"--store={tmp_path / 'store'}")
+    assert result.returncode == 2
+    assert "name" in result.stderr
+    assert not (tmp_path / "store").exists()
+
+
+def test_markup_in_a_name_is_text(ensemble, finished_study, tmp_path: Path) -> None:
+    store = shutil.copytree(finished_study.store, tmp_path / "store")
+    name = "a[/b] [red]c"
+    assert (
+        ensemble("bisect", *QUICK_STUDY, f"--set=name={json.dumps(name)}", f"--store={store}").returncode == 0
+    )
+    for command in (["query", "boundaries"], ["show", name]):
+        result = ensemble(*command, f"--store={store}")
+        assert result.returncode == 0, result.stderr
+    assert name in ensemble("query", "boundaries", f"--store={store}").stdout
+
+
+def test_a_run_is_made_again_and_the_earlier_one_is_kept(ensemble, stored_run, tmp_path: Path) -> None:
+    store, key = stored_run
+    store = shutil.copytree(store, tmp_path / "store")
+    result = ensemble("run", *QUICK, "--store", str(store), "--again", "--json")
+    assert result.returncode == 0, result.stderr
+    assert json.loads(result.stdout)["run_key"] == key
+    assert (store / "lost+found" / key).is_dir()
+    assert (store / "runs" / key).is_dir()
+
+
+def test_a_damaged_run_is_named_set_aside_and_made_again(ensemble, stored_run, tmp_path: Path) -> None:
+    store, key = stored_run
+    store = shutil.copytree(store, tmp_path / "store")
+    shutil.rmtree(store / "runs" / key / "tangent_angle")
+    for command in (
+        ["show", key, "--output", str(tmp_path / "run.png")],
+        ["export", key, str(tmp_path / "run.h5")],
+    ):
+        result = ensemble(*command, f"--store={store}")
+        assert result.returncode == 1
+        (line,) = result.stderr.splitlines()
+        assert key in line
+        assert "missing" in line
+    assert ensemble("check", f"--store={store}").returncode == 1
+    repaired = ensemble("check", "--repair", f"--store={store}")
+    assert repaired.returncode == 0, repaired.stdout
+    assert "set aside" in repaired.stdout
+    assert ensemble("run", *QUICK, "--store", str(store)).returncode == 0
+    assert ensemble("check", f"--store={store}").returncode == 0
+
+
+def test_stores_are_merged(ensemble, stored_run, finished_study, tmp_path: Path) -> None:
+    store, key = stored_run
+    target = shutil.copytree(finished_study.store, tmp_path / "store")
+    assert ensemble("merge", str(store), "--into", str(target), "--json").stdout.count('"runs": 1') == 1
+    assert ensemble("show", key, f"--store={target}").returncode == 0
+    assert ensemble("check", f"--store={target}").returncode == 0
+
+
+def alive(marker: str) -> list[psutil.Process]:
+    """Processes whose arguments hold a text."""
+    found = []
+    for process in psutil.process_iter():
+        try:
+            if any(marker in argument for argument in process.cmdline()):
+                found.append(process)
+        except psutil.Error:
+            continue
+    return found
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["SIGINT", "SIGTERM"])
+def test_a_signal_ends_a_study_with_one_line(launcher, tmp_path: Path, ranks: int, number: int) -> None:
+    moment = random.Random(int(number) + ranks)
+    store = tmp_path / "store"
+    for _ in range(2):
+        with launcher.start(ranks, [*ENSEMBLE, "bisect", f"--store={store}"]) as job:
+            time.sleep(moment.uniform(0.5, 4.0))
+            job.send_signal(number)
+            _, said = job.communicate(timeout=60)
+        assert job.returncode != 0
+        assert "Traceback" not in said
+        assert said.count("interrupted") <= 1
+        assert alive(str(store)) == []
