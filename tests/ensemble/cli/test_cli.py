@@ -7,6 +7,7 @@ import math
 import os
 import subprocess
 import sys
+from importlib.metadata import version
 from pathlib import Path
 
 import h5py
@@ -357,3 +358,29 @@ def test_other_packages_add_commands(ensemble, tmp_path):
     result = ensemble("greet", "Ada", environment={"PYTHONPATH": path})
     assert result.returncode == 0, result.stderr
     assert result.stdout == "hello Ada\n"
+
+
+def test_the_version_is_that_of_the_distribution(ensemble):
+    result = ensemble("--version")
+    assert (result.returncode, result.stdout.strip()) == (0, version("vesicle-ensemble"))
+
+
+def test_shells_complete_commands_presets_and_kinds(ensemble):
+    def completed(*words: str) -> list[str]:
+        environment = {
+            "_ENSEMBLE_COMPLETE": "complete_bash",
+            "COMP_WORDS": " ".join(["ensemble", *words]),
+            "COMP_CWORD": str(len(words)),
+        }
+        return ensemble(environment=environment).stdout.split()
+
+    assert completed("bis") == ["bisect"]
+    assert completed("run", "vesicle-s") == ["vesicle-shear"]
+    assert completed("schema", "st") == ["study"]
+
+
+def test_the_schema_of_a_kind_of_documents_is_printed(ensemble):
+    assert json.loads(ensemble("schema", "scene").stdout)["required"] == ["horizon"]
+    refused = ensemble("schema", "novel")
+    assert (refused.returncode, refused.stdout) == (2, "")
+    assert "kinds: study, scene" in refused.stderr
