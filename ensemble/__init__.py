@@ -2,6 +2,20 @@
 
 `README.md` beside this file is the guide.  Names are imported on first use: importing the package loads
 nothing.
+
+The parts, from the lowest to the highest. Each imports only parts that stand before it, and `solver`; a test
+checks this.
+
+1. `errors`, `timestamp`, `disk`: what all parts need
+2. `config`: documents, presets, changes by dotted path, keys of runs
+3. `search`: which run is the most useful one to make next; no MPI, no files
+4. `store`: runs and boundaries on disk
+5. `mpi`: runs on groups of ranks
+6. `display`: progress and tables
+7. `figures`: phase diagrams, runs, movies
+8. `questions`: kinds of question, one module each: cost, how it is answered, how the answer is shown
+9. `report`: reports on the solver, and the paper recomputed
+10. `cli`: the command line
 """
 
 from __future__ import annotations
