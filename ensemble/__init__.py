@@ -13,8 +13,8 @@ checks this.
 5. `mpi`: runs on groups of ranks
 6. `display`: progress and tables
 7. `figures`: phase diagrams, runs, movies
-8. `questions`: kinds of question, one module each: cost, how it is answered, how the answer is shown
-9. `report`: reports on the solver, and the paper recomputed
+8. `report`: reports on the solver, and the paper recomputed
+9. `questions`: kinds of question, one module each: cost, how it is answered, how the answer is shown
 10. `cli`: the command line
 """
 

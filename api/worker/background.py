@@ -1,7 +1,7 @@
 """The command line at low priority: ``python -m api.worker.background ARGUMENTS...``.
 
-Every rank of a job runs so.  A service then answers while it computes: a job has all that is left of the
-machine, and beside a server, a shell, or whatever else its users do there it takes a third of their share.
+Every rank of a job runs in this way, so that the service answers while a job computes.  A job takes what is
+left of the machine; competing with a server, a shell or other programs it takes a third of their share.
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ from pathlib import Path
 
 from tenacity import retry, retry_if_exception_type, stop_after_delay, wait_random
 
-NICENESS = 5  # a third of the weight of what has none
+NICENESS = 5  # a third of the weight of a process with none
 AUTOGROUP = Path("/proc/self/autogroup")
 
 
 def main() -> None:
-    """Give way, and do what the command line does."""
+    """Lower the priority of this process and its session, and run the command line."""
     os.nice(NICENESS)
-    # Linux weighs sessions against each other, and launchers give each rank one of its own: between these
-    # the niceness of a process means nothing.  Not every kernel does so.
+    # Linux weighs sessions against each other, and launchers give each rank a session of its own.  Between
+    # sessions the niceness of a process means nothing.  Not every kernel weighs sessions.
     with suppress(OSError):
         _weigh_session()
     from ensemble.cli.main import main as run
@@ -30,7 +30,7 @@ def main() -> None:
     run()
 
 
-# The kernel takes few such changes at a time, and has the ranks of a job ask again.
+# The kernel accepts few such changes at a time; the others have to try again.
 @retry(
     retry=retry_if_exception_type(BlockingIOError),
     wait=wait_random(0.1, 0.3),

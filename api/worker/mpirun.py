@@ -1,4 +1,4 @@
-"""One `mpirun` with everything it starts, and what it says."""
+"""One `mpirun` with all of its descendants and its output."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def mpirun_command(ranks: int, arguments: Sequence[str]) -> list[str]:
     mpirun = str(beside) if beside.exists() else shutil.which("mpirun")
     if mpirun is None:
         raise BadInput("mpirun: there is none on the PATH (the extra 'mpich' brings one)")
-    # -P: a folder of a package's name where the service was started must not take its place.
+    # -P: a folder with the name of a package, where the service was started, must not be imported instead.
     return [mpirun, "-n", str(ranks), sys.executable, "-P", "-m", "api.worker.background", *arguments]
 
 
@@ -55,8 +55,16 @@ class Process(AbstractContextManager["Process"]):
     Parameters
     ----------
     command : sequence of str
+        Program and arguments.
     log : Path
-        Its standard error is appended to this file.
+        Standard error is appended to this file.
+
+    Attributes
+    ----------
+    progress : ProgressLine
+        The latest one that the command has written to standard error.
+    last_words : str
+        The latest other line that it has written there.
     """
 
     def __init__(self, command: Sequence[str], log: Path) -> None:
@@ -97,12 +105,12 @@ class Process(AbstractContextManager["Process"]):
         return status if status >= 0 else 128 - status
 
     def output(self) -> str:
-        """Return its standard output so far."""
+        """Return the standard output so far."""
         self._output.seek(0)
         return self._output.read()
 
     def end(self) -> None:
-        """Kill it and all its descendants; none is left when this returns."""
+        """Kill the command and all of its descendants; none is left when this returns."""
         assert self._watcher.stdin is not None
         self._watcher.stdin.close()
         self._watcher.wait()
@@ -114,11 +122,11 @@ class Process(AbstractContextManager["Process"]):
 
     def _read(self, log: Path) -> None:
         assert self._watcher.stderr is not None
-        with self._watcher.stderr as said, log.open("a", encoding="utf-8") as file:
-            for line in said:
-                self._take(line, file)
+        with self._watcher.stderr as lines, log.open("a", encoding="utf-8") as file:
+            for line in lines:
+                self._record(line, file)
 
-    def _take(self, line: str, log: TextIO) -> None:
+    def _record(self, line: str, log: TextIO) -> None:
         try:
             self.progress = ProgressLine.model_validate_json(line)
         except ValidationError:

@@ -1,11 +1,11 @@
-"""Runs a command, and ends everything that comes of it as soon as the command or its worker has ended.
+"""Runs a command, and ends all of its descendants as soon as the command or its worker has ended.
 
     python -m api.worker.watcher COMMAND...
 
 MPI launchers put their helpers and ranks into sessions of their own, so neither a signal to a group nor the
-end of the launcher reaches all of them.  This process adopts whatever loses its parent below it, and kills
-until there is nothing left.  It waits between a worker and a launcher; standard input tells it that the
-worker is gone, by its end.
+end of the launcher reaches all of them.  This process stands between a worker and a launcher.  It adopts
+descendants that lose their parents, and kills until none is left.  The end of its standard input tells it
+that the worker is gone.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def _start(command: list[str]) -> subprocess.Popen[bytes]:
     return subprocess.Popen(
         command,
         stdin=subprocess.DEVNULL,
-        # Should this process itself be killed, the launcher takes its ranks along.
+        # If this process itself is killed, the launcher is too, and takes its ranks along.
         preexec_fn=lambda: _control_process(PR_SET_PDEATHSIG, signal.SIGKILL),
     )
 
@@ -55,7 +55,7 @@ def _end_with_worker() -> None:
 
 
 def _kill_everything() -> None:
-    """Kill all descendants, and those that appear meanwhile, and bury them."""
+    """Kill all descendants, also those that appear meanwhile, and reap them."""
     while descendants := psutil.Process().children(recursive=True):
         for process in descendants:
             with suppress(psutil.NoSuchProcess):

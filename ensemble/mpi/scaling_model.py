@@ -1,8 +1,8 @@
-"""How the time of one evaluation of a scene depends on the ranks that share it, and how many it is worth.
+"""How the time of one evaluation of a scene depends on the ranks that share it, and how many ranks pay off.
 
-An evaluation sums over all pairs of points, in rows that ranks share, as they share what a point does to its
-own vesicle and near ones; every rank repeats the rest that grows like the number of points (shapes, search
-for neighbors); and for each sum the ranks gather the rows of all.  With P points on G ranks
+Ranks share the sums over all pairs of points by rows, and also the interactions of a point with its own
+vesicle and with near ones.  Every rank repeats the rest that grows like the number of points (shapes, search
+for neighbors).  For each sum the ranks gather the rows of all.  With P points on G ranks
 
     t(G) = (pair·P² + point·P)/G + repeated·P + fixed
            + gathers·(latency·⌈log₂ G⌉ + bytes·P·(G − 1)/(G·bandwidth)),
@@ -20,9 +20,9 @@ from pydantic import BaseModel, ConfigDict, Field
 from solver.membrane.symmetry import independent_vesicles
 from solver.scene import Scene
 
-_AUTOMATIC_POINTS = 64  # that a scene usually comes to which leaves the number to the solver
+_AUTOMATIC_POINTS = 64  # what a scene that leaves the number to the solver usually comes to
 
-# The ranks of a run are worth their while as long as they are this efficient.
+# The ranks of a run pay off as long as they are this efficient.
 LEAST_EFFICIENCY: Final = 0.7
 
 
@@ -121,7 +121,7 @@ class ScalingModel(BaseModel):
         return self.seconds(points, 1) / (ranks * self.seconds(points, ranks))
 
     def recommended_ranks(self, points: float, available: int) -> int:
-        """Return the largest number of ranks that are still as efficient as `LEAST_EFFICIENCY`.
+        """Return the largest number of ranks whose efficiency is at least `LEAST_EFFICIENCY`.
 
         Parameters
         ----------

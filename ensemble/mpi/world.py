@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-# What launchers tell their processes, most specific first: an mpirun inside a Slurm step overrides the step.
+# Variables by which launchers inform their processes, most specific first: an mpirun inside a Slurm step
+# overrides the step.
 _SIZE_VARIABLES = ("PMI_SIZE", "OMPI_COMM_WORLD_SIZE", "MV2_COMM_WORLD_SIZE", "SLURM_STEP_NUM_TASKS")
 _RANK_VARIABLES = ("PMI_RANK", "OMPI_COMM_WORLD_RANK", "MV2_COMM_WORLD_RANK", "SLURM_PROCID")
 
@@ -37,7 +38,7 @@ def pin_threads() -> None:
 
     `simulate` limits BLAS by itself.  These variables, which the libraries read when they are loaded, spare
     each rank the threads that BLAS would start, one for each processor, and keep idle.  Child processes
-    inherit them.  This comes before the first import of NumPy.
+    inherit them.  Call this before the first import of NumPy.
     """
     for variable in _THREAD_VARIABLES:
         os.environ.setdefault(variable, "1")

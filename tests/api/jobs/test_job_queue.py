@@ -140,8 +140,8 @@ def test_an_accepted_job_is_what_was_asked_for(jobs, clock):
 
 def test_one_key_makes_one_job_however_many_ask_at_once(jobs):
     with ThreadPoolExecutor(50) as pool:
-        asked = [pool.submit(accepted, jobs, SCENE, "ada", 1, SECONDS, "key", 1) for _ in range(50)]
-    answers = [answer.result() for answer in asked]
+        requests = [pool.submit(accepted, jobs, SCENE, "ada", 1, SECONDS, "key", 1) for _ in range(50)]
+    answers = [answer.result() for answer in requests]
     assert sum(answer.new for answer in answers) == 1
     assert {answer.job.id for answer in answers} == {job.id for job in jobs.latest(100)}
     assert len(jobs.latest(100)) == 1
@@ -269,11 +269,11 @@ def test_a_leased_job_runs(jobs, clock):
 def test_progress_never_falls(jobs):
     submit(jobs)
     lease = leased(jobs)
-    seen = []
+    states = []
     for progress in (10, 40, 30):
         assert jobs.heartbeat(lease, progress, f"at {progress}")
-        seen.append((jobs.get(lease.job.id).progress, jobs.get(lease.job.id).message))
-    assert seen == [(10, "at 10"), (40, "at 40"), (40, "at 30")]
+        states.append((jobs.get(lease.job.id).progress, jobs.get(lease.job.id).message))
+    assert states == [(10, "at 10"), (40, "at 40"), (40, "at 30")]
 
 
 @pytest.mark.parametrize("status", [JobStatus.SUCCEEDED, JobStatus.FAILED])

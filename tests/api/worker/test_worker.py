@@ -70,8 +70,8 @@ def made(store: Path) -> dict[str, str]:
 
 def simulating(family: Family, ranks: int) -> Callable[[], bool]:
     def all_there() -> bool:
-        found = [process.environ().get("PMI_RANK") for process in family.descendants()]
-        return {str(number) for number in range(ranks)} <= set(found)
+        started = {process.environ().get("PMI_RANK") for process in family.descendants()}
+        return {str(number) for number in range(ranks)} <= started
 
     return all_there
 

@@ -50,16 +50,16 @@ def test_the_last_group_has_what_is_left(launcher):
 
 
 @pytest.mark.parametrize(
-    ("asked", "message"),
+    ("requested", "message"),
     [
         ("0", "0 — must be from 1 to 4"),
         ("5", "5 — must be from 1 to 4"),
         ("many", "'many' — must be a number"),
     ],
 )
-def test_groups_that_cannot_be_are_refused(asked, message):
+def test_impossible_numbers_of_ranks_are_refused(requested, message):
     with pytest.raises(BadInput, match=f"--ranks-per-run: {message}"):
-        chosen_ranks(asked, load_scene("doublet-shear"), 4)
+        chosen_ranks(requested, load_scene("doublet-shear"), 4)
 
 
 def test_automatic_groups_are_efficient_and_grow_with_the_scene():

@@ -313,7 +313,7 @@ def test_refusals_name_what_is_wrong() -> None:
         search.withdraw(1.0)
     search.tell(1.0, Side.LOW)
     search.tell(1.0, Side.LOW)
-    with pytest.raises(ValueError, match="cannot be high: it was told to be low"):
+    with pytest.raises(ValueError, match="cannot be high: it is known to be low"):
         search.tell(1.0, Side.HIGH)
     with pytest.raises(ValueError, match=r"limits: \[5.0, 0.05\]"):
         CriticalValueSearch(GRID, (5.0, 0.05))

@@ -1,0 +1,113 @@
+"""Kinds of question: how documents are recognized, keys of answers, costs and sizes."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any
+
+import pytest
+
+from ensemble.config.documents import load_scene, load_study, preset_document, preset_names
+from ensemble.config.run_key import run_key
+from ensemble.questions import kind_named, kind_of, kind_of_model, kinds, preset_question
+from ensemble.questions.cost import MOST_RECORDS
+from ensemble.questions.scene_question import SceneQuestion
+from ensemble.questions.study_question import StudyQuestion
+from solver.scene import Numerics
+
+
+def test_markers_and_names_tell_the_kinds_apart() -> None:
+    for name in ("kind", "marker", "command", "collection", "document_type"):
+        values = [getattr(kind, name) for kind in kinds()]
+        assert len(set(values)) == len(values)
+
+
+def test_every_preset_is_of_one_kind() -> None:
+    kinds_of_presets = Counter(kind_of(preset_document(name)).kind for name in preset_names())
+    assert kinds_of_presets.keys() == {"study", "scene"}
+    assert all(kind_of(preset_document(name)) is type(preset_question(name, {})) for name in preset_names())
+
+
+@pytest.mark.parametrize(
+    "document", [{}, {"vesicles": [{}]}, preset_document("doublet-shear") | {"search": {}}]
+)
+def test_a_document_of_no_kind_or_of_two_is_refused(document: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match=r"exactly one of the keys 'search' \(study\), 'horizon' \(scene\)"):
+        kind_of(document)
+
+
+def test_what_is_no_kind_is_refused() -> None:
+    with pytest.raises(ValueError, match="'novel' is no kind of question; kinds: study, scene"):
+        kind_named("novel")
+    with pytest.raises(ValueError, match="Numerics"):
+        kind_of_model(Numerics())
+
+
+def test_keys_are_those_of_the_answers() -> None:
+    assert SceneQuestion(load_scene("doublet-shear")).key == run_key(load_scene("doublet-shear"))
+    assert StudyQuestion(load_study("critical-hamaker")).key == load_study("critical-hamaker").key
+
+
+def test_a_question_is_called_as_its_document_its_preset_or_its_kind() -> None:
+    assert preset_question("critical-hamaker", {"name": "mine"}).name == "mine"
+    assert preset_question("doublet-shear", {"horizon": 5.0}).name == "doublet-shear"
+    assert SceneQuestion(load_scene("doublet-shear")).name == "scene"
+
+
+def test_the_scene_that_decides_about_ranks_is_that_of_the_document() -> None:
+    assert preset_question("critical-hamaker", {}).scene == load_study("critical-hamaker").scene
+    assert preset_question("doublet-shear", {}).scene == load_scene("doublet-shear")
+
+
+def test_a_certified_search_costs_two_finer_runs_more_at_each_point() -> None:
+    plain = preset_question("critical-hamaker", {}).cost
+    certified = preset_question("critical-hamaker", {"search.certify": True}).cost
+    points = len(load_study("critical-hamaker").sweep.values)
+    assert certified.runs == plain.runs + 2 * points
+    work_of_a_run = plain.work / plain.runs
+    assert certified.work == pytest.approx(plain.work + 2 * points * 2 * work_of_a_run)
+
+
+def test_a_run_that_would_record_too_much_is_refused_by_its_interval() -> None:
+    time = load_scene("doublet-shear").horizon * load_scene("doublet-shear").criteria.extensions
+    least = time / MOST_RECORDS
+    assert preset_question("doublet-shear", {"output.interval": 1.01 * least}).cost.runs == 1
+    with pytest.raises(ValueError, match=r"output\.interval: .* — must be at least"):
+        _ = preset_question("doublet-shear", {"output.interval": 0.99 * least}).cost
+    # Also where only one limit of a search makes a run so long.
+    changes = {"search.parameter": "horizon", "search.limits": [1.0, 1e4], "search.guesses": []}
+    with pytest.raises(ValueError, match=r"output\.interval"):
+        _ = preset_question("critical-hamaker", changes | {"scene.output.interval": 1e-2}).cost
+
+
+@pytest.mark.parametrize(
+    ("kind", "document", "message"),
+    [
+        ("scene", {"vesicles": [{}] * 257}, "vesicles: 257 elements — must be at most 256"),
+        ("scene", {"arrangement": {"count": "300"}}, "arrangement: 300 vesicles — must be at most 256"),
+        ("scene", {"arrangement": {"rows": 20, "columns": 20}}, "arrangement: 400 vesicles"),
+        ("study", {"scene": {"vesicles": [{}] * 5}}, "scene.vesicles: 5 elements — must be at most 4"),
+        ("study", {"scene": {"arrangement": {"count": 5}}}, "scene.arrangement: 5 vesicles"),
+        ("study", {"sweep": {"values": [0.5] * 65}}, "sweep.values: 65 elements — must be at most 64"),
+    ],
+)
+def test_a_document_that_is_too_large_is_refused(kind: str, document: Any, message: str) -> None:
+    with pytest.raises(ValueError, match="^" + message):
+        kind_named(kind).check_size(document)
+
+
+@pytest.mark.parametrize("kind", ["scene", "study"])
+@pytest.mark.parametrize("document", [None, 7, [], {"vesicles": "many", "scene": 3, "arrangement": []}])
+def test_sizes_are_checked_whatever_the_document_is(kind: str, document: Any) -> None:
+    kind_named(kind).check_size(document)
+
+
+def test_summaries_of_answers() -> None:
+    points = [
+        {"status": "converged", "parameters": {"flow.rate": 0.5}},
+        {"status": "unbracketed", "parameters": {"flow.rate": 1.0}},
+    ]
+    study, scene = kind_named("study"), kind_named("scene")
+    assert study.summary({"boundary": points}) == "1 of 2 points converged; flow.rate 1: unbracketed"
+    assert scene.summary({"outcome": "bound", "failure": None}) == "bound"
+    assert scene.summary({"outcome": "failed", "failure": "too distorted"}) == "too distorted"
