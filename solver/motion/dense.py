@@ -43,7 +43,7 @@ Array = NDArray[np.float64]
 class DenseEquation:
     """The equation of motion with its exact Jacobian; see `EquationOfMotion`.
 
-    Parameters
+    Attributes
     ----------
     membranes : Membranes
     bending : Bending
@@ -55,9 +55,6 @@ class DenseEquation:
     layer : SingleLayer
     contrast : ViscosityContrast or None
         None if all viscosities are equal.
-
-    Attributes
-    ----------
     evaluations, recordings : int
         See `EquationOfMotion`.
     """
@@ -109,7 +106,7 @@ class DenseEquation:
 
     @property
     def tension_iterations(self) -> int:
-        """Iterations of the search for the tension so far."""
+        """Number of iterations of the search for the tension so far."""
         return self.inextensibility.iterations
 
     def motion(self, state: Array) -> Motion:

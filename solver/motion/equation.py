@@ -80,12 +80,10 @@ class Motion:
 
     @property
     def rate(self) -> Array:
-        """d(state)/dt, (state_size,).
-
-        The two highest modes of the tangent angle stay as they are: their tangents alias onto a mode whose
-        derivative vanishes, so that bending does not damp them, and the tangential velocity of the points
-        would slowly fill them.
-        """
+        """Rate of change of the state, (state_size,)."""
+        # The two highest modes of the tangent angle stay as they are: their tangents alias onto a mode whose
+        # derivative vanishes, so that bending does not damp them, and the tangential velocity of the points
+        # would slowly fill them.
         angle_rate = self.rotation_rate.copy()
         points = angle_rate.shape[1]
         add_tangential_motion(self.geometry.curvature, angle_rate, highest_modes(points))
@@ -154,7 +152,7 @@ class EquationOfMotion(Protocol):
 
     @property
     def tension_iterations(self) -> int:
-        """Iterations of the search for the tension so far, of steps and recordings together."""
+        """Number of iterations of the search for the tension so far, of steps and recordings together."""
 
     def motion(self, state: Array) -> Motion:
         """Compute velocity, tension and forces in a state, without any effect on later calls.

@@ -41,7 +41,7 @@ class SummedEquation:
 
     See `EquationOfMotion`.
 
-    Parameters
+    Attributes
     ----------
     scene : Scene
     parallel : Parallel
@@ -54,9 +54,6 @@ class SummedEquation:
         None in a quiescent fluid.
     inextensibility : SummedInextensibility
     layer : SummedSingleLayer
-
-    Attributes
-    ----------
     contrast : None
         Sums know no other viscosity inside the vesicles.
     evaluations, recordings : int
@@ -114,7 +111,7 @@ class SummedEquation:
 
     @property
     def tension_iterations(self) -> int:
-        """Iterations of the search for the tension so far."""
+        """Number of iterations of the search for the tension so far."""
         return self.inextensibility.iterations
 
     def motion(self, state: Array) -> Motion:
