@@ -57,7 +57,7 @@ ORDER = {
         __init__
         """,
     "ensemble": """
-        disk errors timestamp
+        disk errors interrupts timestamp
         config
         search
         figures store
