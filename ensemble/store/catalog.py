@@ -111,9 +111,9 @@ class Catalog:
         """Raise a database error unless the tables can be read and SQLite finds its file undamaged."""
         with self._engine.connect() as connection:
             if self._engine.dialect.name == "sqlite":
-                (found,) = connection.exec_driver_sql("PRAGMA quick_check(1)").one()
-                if found != "ok":
-                    raise DatabaseError(None, None, ValueError(found))
+                (verdict,) = connection.exec_driver_sql("PRAGMA quick_check(1)").one()
+                if verdict != "ok":
+                    raise DatabaseError(None, None, ValueError(verdict))
             for table in (RunRow, BoundaryRow):
                 connection.execute(select(table).limit(1))
 

@@ -1,9 +1,9 @@
 """Databases of a store: an SQLite file each, unless the store was made with the URL of a server.
 
 The environment variable ``ENSEMBLE_DATABASE``, such as ``postgresql+psycopg://user@host/name``, names the
-server when a store is made.  The store keeps it (in a file that its owner alone may read, as there may be a
-password in it), so nobody who opens the store later has to know, or can miss, where its catalog is.  Several
-stores may share a database: the catalog of each is in a schema of its own.
+server when a store is made.  The store keeps it in a file that only its owner may read, because the URL may
+hold a password.  So nobody who opens the store later has to know where its catalog is.  Several stores may
+share a database: the catalog of each is in a schema of its own.
 """
 
 from __future__ import annotations
@@ -111,7 +111,7 @@ class Place(BaseModel):
 
 
 def _write_secretly(path: Path, text: str) -> None:
-    """Write a file that its owner alone may read, whole or not at all."""
+    """Write a file that only its owner may read, whole or not at all."""
     with replacing(path) as unfinished:
         unfinished.touch(mode=0o600)
         unfinished.write_text(text, encoding="utf-8")

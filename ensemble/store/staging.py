@@ -107,6 +107,7 @@ class RunStaging(AbstractContextManager["RunStaging"]):
             self._descriptor = None
 
     def __exit__(self, *_: object) -> None:
+        """Close."""
         self.close()
 
     def _register(self) -> int:

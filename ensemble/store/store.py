@@ -61,7 +61,7 @@ class Store(AbstractContextManager["Store"]):
     def open(cls, path: Path) -> Self:
         """Open a store to write to: create it if there is none, and adopt what processes left in it.
 
-        A new one has its catalog in a file, or on the server that `ensemble.store.sql_database` tells of.
+        A new one has its catalog in a file, or on the server that `ensemble.store.sql_database` describes.
 
         Parameters
         ----------
@@ -121,6 +121,7 @@ class Store(AbstractContextManager["Store"]):
         self._catalog.close()
 
     def __exit__(self, *_: object) -> None:
+        """Close."""
         self.close()
 
     def stage(self, run: Run, summary: RunSummary | None = None) -> Staged:
@@ -281,7 +282,7 @@ class Store(AbstractContextManager["Store"]):
             (path / CATALOG).touch()
             with closing(catalog):
                 catalog.create()
-        return [*done, f"{CATALOG} is made anew"]
+        return [*done, f"{CATALOG} is made again"]
 
     def set_aside(self, key: str) -> Path:
         """Take a run out of the store, so that it can be made again, and keep its files.

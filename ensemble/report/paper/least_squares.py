@@ -13,7 +13,7 @@ _FEWEST = 3  # two values lie on a line, and on a power law, whatever the physic
 
 
 @dataclass(frozen=True)
-class PowerLaw:
+class PowerLawFit:
     """The power law value = prefactor · x^exponent.
 
     Attributes
@@ -34,7 +34,7 @@ class PowerLaw:
 
 
 @dataclass(frozen=True)
-class StraightLine:
+class StraightLineFit:
     """The line value = intercept + slope · x.
 
     Attributes
@@ -51,7 +51,7 @@ class StraightLine:
     slope_error: float
 
 
-def power_law(x: Sequence[float], values: Sequence[float]) -> PowerLaw:
+def power_law(x: Sequence[float], values: Sequence[float]) -> PowerLawFit:
     """Fit a power law: a straight line through the logarithms, by least squares.
 
     Parameters
@@ -61,7 +61,7 @@ def power_law(x: Sequence[float], values: Sequence[float]) -> PowerLaw:
 
     Returns
     -------
-    PowerLaw
+    PowerLawFit
         The fit.
 
     Raises
@@ -70,10 +70,10 @@ def power_law(x: Sequence[float], values: Sequence[float]) -> PowerLaw:
         If there are fewer than three values.
     """
     line = straight_line(np.log(x).tolist(), np.log(values).tolist())
-    return PowerLaw(float(np.exp(line.intercept)), line.slope, line.slope_error)
+    return PowerLawFit(float(np.exp(line.intercept)), line.slope, line.slope_error)
 
 
-def straight_line(x: Sequence[float], values: Sequence[float]) -> StraightLine:
+def straight_line(x: Sequence[float], values: Sequence[float]) -> StraightLineFit:
     """Fit a straight line by least squares.
 
     The confidence intervals are those of Student's t distribution with two degrees of freedom fewer than
@@ -86,7 +86,7 @@ def straight_line(x: Sequence[float], values: Sequence[float]) -> StraightLine:
 
     Returns
     -------
-    StraightLine
+    StraightLineFit
         The fit.
 
     Raises
@@ -98,7 +98,7 @@ def straight_line(x: Sequence[float], values: Sequence[float]) -> StraightLine:
         raise ValueError(f"a fit needs at least {_FEWEST} values, got {len(x)}")
     line = linregress(x, values)
     quantile = t.ppf((1 + _CONFIDENCE) / 2, len(x) - 2)
-    return StraightLine(
+    return StraightLineFit(
         float(line.intercept),
         float(line.slope),
         float(quantile * line.intercept_stderr),

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from ensemble.figures.style import BLACK, GRAY, MARKS, STYLE, WIDTH
 from ensemble.figures.symbols import DISTANCE, quantity
 from ensemble.report.paper.comparison import Interval
-from ensemble.report.paper.least_squares import StraightLine
+from ensemble.report.paper.least_squares import StraightLineFit
 from solver.analysis.run import Outcome
 from solver.flows import Shear
 
@@ -30,7 +30,7 @@ class BoundaryDiagram:
         Shear rate, Hamaker constant and outcome of each run.
     brackets : mapping of float to (float, float)
         Brackets of the critical Hamaker constant by shear rate.
-    line : StraightLine or None
+    line : StraightLineFit or None
         The line through them.
     published_brackets : mapping of float to (float, float)
         Published brackets by shear rate.
@@ -41,7 +41,7 @@ class BoundaryDiagram:
     distance: float
     runs: Sequence[tuple[float, float, Outcome]]
     brackets: Mapping[float, Interval]
-    line: StraightLine | None
+    line: StraightLineFit | None
     published_brackets: Mapping[float, Interval]
     published_line: tuple[float, float]
 

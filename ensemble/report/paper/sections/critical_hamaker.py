@@ -21,7 +21,7 @@ from ensemble.report.paper.comparison import (
     runs_of,
     study_runs,
 )
-from ensemble.report.paper.least_squares import StraightLine, straight_line
+from ensemble.report.paper.least_squares import StraightLineFit, straight_line
 from ensemble.report.paper.results import Results
 from ensemble.report.paper.section import (
     Section,
@@ -170,7 +170,7 @@ def _bracket_comparisons(results: Results, table: _PublishedDiagram, study: Stud
 
 
 def _line_comparisons(
-    table: _PublishedDiagram, line: StraightLine | None, study: StudyCase
+    table: _PublishedDiagram, line: StraightLineFit | None, study: StudyCase
 ) -> list[Comparison]:
     if line is None:
         return []

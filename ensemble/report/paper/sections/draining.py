@@ -14,7 +14,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 from ensemble.figures.style import BLUE, GRAY, GREEN, ORANGE, PURPLE, STYLE, VERMILLION, WIDTH
 from ensemble.report.paper.case import Case
 from ensemble.report.paper.comparison import Comparison, Evidence, compare_numbers, published, runs_of
-from ensemble.report.paper.least_squares import PowerLaw, power_law
+from ensemble.report.paper.least_squares import PowerLawFit, power_law
 from ensemble.report.paper.section import (
     Section,
     SectionContent,
@@ -155,7 +155,7 @@ def _time_comparison(pair: _Pair, known: float | None, times: _Times) -> Compari
     return compare_numbers(name, known, times.get(pair), runs_of(pair.case))
 
 
-def _power_laws(times: _Times, assumptions: _Assumptions) -> dict[str, PowerLaw]:
+def _power_laws(times: _Times, assumptions: _Assumptions) -> dict[str, PowerLawFit]:
     """Return the power laws in δ and in H, where at least three runs did not fail."""
     series = {
         "δ": (_distance_series(assumptions), "distance"),
