@@ -57,12 +57,12 @@ ORDER = {
         __init__
         """,
     "ensemble": """
-        disk errors interrupts timestamp
+        disk errors timestamp
         config
         search
         figures store
         mpi
-        display
+        display interrupts
         questions report
         cli
         __init__ __main__
