@@ -29,7 +29,8 @@ def pair_energy(
 
     Parameters
     ----------
-    formula, parameters
+    formula : PairFormula
+    parameters : tuple
         Of `formula_and_parameters`.
     targets : (2, t)
     sources : (2, s)
@@ -65,7 +66,8 @@ def add_forces(
 
     Parameters
     ----------
-    formula, parameters
+    formula : PairFormula
+    parameters : tuple
         Of `formula_and_parameters`.
     targets : (2, t)
     sources : (2, s)
@@ -103,7 +105,8 @@ def add_stiffnesses(
 
     Parameters
     ----------
-    formula, parameters
+    formula : PairFormula
+    parameters : tuple
         Of `formula_and_parameters`.
     targets : (2, t)
     sources : (2, s)
@@ -139,7 +142,8 @@ def pair_hessian(
 
     Parameters
     ----------
-    formula, parameters
+    formula : PairFormula
+    parameters : tuple
         Of `formula_and_parameters`.
     targets : (2, t)
     sources : (2, s)
@@ -187,7 +191,8 @@ def summed_energy(
         Of all curves, those of the targets first.
     spacing : (C,)
     refinement : Refinement
-    formula, parameters
+    formula : PairFormula
+    parameters : tuple
         Of `formula_and_parameters`.
 
     Returns
@@ -220,7 +225,8 @@ def add_density(
         Of all curves, those of the targets first.
     spacing : (C,)
     refinement : Refinement
-    formula, parameters
+    formula : PairFormula
+    parameters : tuple
         Of `formula_and_parameters`.
     hamaker : float
     density : (2, M, N), added to
@@ -252,7 +258,8 @@ def add_stiffness(
         Of all curves, those of the targets first.
     spacing : (C,)
     refinement : Refinement
-    formula, parameters
+    formula : PairFormula
+    parameters : tuple
         Of `formula_and_parameters`.
     hamaker : float
     stiffness : (3, M, N), added to
@@ -285,7 +292,8 @@ def fill_hessian(
         Of all curves, those of the targets first.
     spacing : (C,)
     refinement : Refinement
-    formula, parameters
+    formula : PairFormula
+    parameters : tuple
         Of `formula_and_parameters`.
     hamaker : float
     hessian : (2, M·N, 2, C·N), written

@@ -262,7 +262,17 @@ class Inextensibility:
 
     @staticmethod
     def stretching(geometry: Geometry, velocity: Array) -> Array:
-        """x_s · u_s for velocities (2, M·N, columns)."""
+        """Return how velocities stretch the membranes, x_s · u_s.
+
+        Parameters
+        ----------
+        geometry : Geometry
+        velocity : (2, M·N, columns)
+
+        Returns
+        -------
+        (M·N, columns)
+        """
         gradient = geometry.column_derivative(velocity)
         gradient *= geometry.tangents.reshape(2, -1, 1)
         gradient[0] += gradient[1]

@@ -61,6 +61,10 @@ class PairPotential(Model, ABC):
 
         With s the arclength along it, both are singular at s = ±id.  That decides how finely membranes are
         sampled for each other.  A force that stays finite at r = 0 needs no more than this default.
+
+        Returns
+        -------
+        float
         """
         return 1.0
 
