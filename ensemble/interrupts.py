@@ -18,8 +18,8 @@ UNWINDING_SECONDS = 1.0
 def end_with_one_line() -> None:
     """Make SIGINT and SIGTERM end this process within two seconds, whatever it is doing.
 
-    Alone, the process unwinds: `Interrupted` is raised, and what it was writing is removed.  If a thread keeps
-    it, it is ended after `UNWINDING_SECONDS`.  Under an MPI launcher the main thread may be inside a
+    Alone, the process unwinds: `Interrupted` is raised, and what it was writing is removed.  If a thread
+    keeps it, it is ended after `UNWINDING_SECONDS`.  Under an MPI launcher the main thread may be inside a
     collective that never returns, because another rank has ended already.  So there another thread ends the
     process at once.  Nothing is lost by that: a run exists once it is committed, and what is not committed is
     adopted or removed when the store is opened next.
