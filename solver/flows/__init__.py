@@ -2,8 +2,8 @@
 
 from typing import Annotated
 
-from solver.flows.base import ImposedFlow, Symbol
 from solver.flows.extension import Extension
+from solver.flows.imposed_flow import ImposedFlow, Symbol
 from solver.flows.shear import Shear
 from solver.flows.trap import Trap
 from solver.registry import Registry

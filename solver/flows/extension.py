@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from solver.flows.base import Array, Symbol
+from solver.flows.imposed_flow import Array, Symbol
 from solver.flows.linear import LinearFlow
 
 

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from solver.flows.base import Array, ImposedFlow
+from solver.flows.imposed_flow import Array, ImposedFlow
 
 
 class LinearFlow(ImposedFlow):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
-from solver.flows.base import Array
 from solver.flows.extension import Extension
+from solver.flows.imposed_flow import Array
 from solver.flows.linear import LinearFlow
 
 

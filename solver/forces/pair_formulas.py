@@ -18,8 +18,8 @@ from numba.extending import NativeValue, models, overload, register_model, typeo
 
 from solver.compilation import compiled
 from solver.pair_potentials import PairPotential
-from solver.pair_potentials.base import Derivatives, Formula
 from solver.pair_potentials.cutoff import truncate
+from solver.pair_potentials.pair_potential import Derivatives, Formula
 
 _FORMULAS: dict[str, Formula] = {}  # by the name that their types have
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.integrate import BDF
 from scipy.sparse import csc_array
 
-from solver.integrators.base import InitialValueProblem, Integrator, Step, StepFailedError, register
+from solver.integrators.integrator import InitialValueProblem, Integrator, Step, StepFailedError, register
 from solver.motion.jacobian import Jacobian
 from solver.scene import Numerics
 

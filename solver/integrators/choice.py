@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from solver.integrators.base import FACTORIES, InitialValueProblem, Integrator
+from solver.integrators.integrator import FACTORIES, InitialValueProblem, Integrator
 from solver.scene import Numerics
 
 

@@ -8,8 +8,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.integrators.base import DifferentialEquation, InitialValueProblem, Step, StepFailedError
 from solver.integrators.control import Attempt, StepControl, root_mean_square
+from solver.integrators.integrator import DifferentialEquation, InitialValueProblem, Step, StepFailedError
 from solver.motion.jacobian import Jacobian
 
 Array = NDArray[np.float64]

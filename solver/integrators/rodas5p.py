@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.integrators.base import InitialValueProblem, Integrator, register
 from solver.integrators.control import AdaptiveStep, EmbeddedError
+from solver.integrators.integrator import InitialValueProblem, Integrator, register
 from solver.integrators.one_step import OneStepIntegrator
 from solver.integrators.rosenbrock import Rosenbrock, Tableau
 from solver.scene import Numerics

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import KroghInterpolator
 
-from solver.integrators.base import InitialValueProblem, Integrator, register
 from solver.integrators.collocation import GaussLobatto
 from solver.integrators.control import AdaptiveStep, Attempt, ConservedError, EmbeddedError, ErrorMeasure
+from solver.integrators.integrator import InitialValueProblem, Integrator, register
 from solver.integrators.one_step import Linearization, OneStepIntegrator
 from solver.scene import Numerics
 

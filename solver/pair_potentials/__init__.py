@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from solver.pair_potentials.base import PairPotential
+from solver.pair_potentials.pair_potential import PairPotential
 from solver.pair_potentials.power_law import PowerLaw
 from solver.registry import Registry
 

@@ -7,7 +7,7 @@ from typing import Literal, Self
 
 from pydantic import model_validator
 
-from solver.pair_potentials.base import Derivatives, Formula, PairPotential
+from solver.pair_potentials.pair_potential import Derivatives, Formula, PairPotential
 
 _LARGEST = 127  # exponent of which the formulas below take all binary digits
 

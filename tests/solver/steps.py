@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from solver.integrators import InitialValueProblem, Integrator, Step
-from solver.integrators.base import DifferentialEquation
 from solver.integrators.bdf import BackwardDifferentiation
 from solver.integrators.control import Attempt, StepDecision, root_mean_square
+from solver.integrators.integrator import DifferentialEquation
 from solver.integrators.one_step import OneStepIntegrator, OneStepMethod
 from solver.motion.dense import DenseEquation
 from solver.motion.jacobian import DenseJacobian

@@ -1,6 +1,6 @@
 """When a run is decided, and how: one outcome criterion a module.  `solver/README.md` says how to add one."""
 
-from solver.analysis.criteria.base import Criterion, History
+from solver.analysis.criteria.criterion import Criterion, History
 from solver.analysis.criteria.revolved import Revolved
 from solver.analysis.criteria.separated import Separated
 from solver.analysis.criteria.steady import Steady

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from solver.analysis.criteria.base import Criterion, History
+from solver.analysis.criteria.criterion import Criterion, History
 from solver.analysis.run import Outcome
 from solver.scene import Scene
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from solver.analysis.criteria.base import Criterion, History
+from solver.analysis.criteria.criterion import Criterion, History
 from solver.analysis.revolutions import may_tumble
 from solver.analysis.run import Outcome
 from solver.scene import Scene

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter, ValidationError
 
 from solver import simulate
-from solver.integrators.base import FACTORIES, register, unregister
 from solver.integrators.bdf import backward_differentiation
+from solver.integrators.integrator import FACTORIES, register, unregister
 from solver.scene import Numerics
 from solver.scene.numerics import INTEGRATORS
 from tests.solver.scenes import fixed_horizon, shear_pair

@@ -23,7 +23,7 @@ from solver.forces.pair_sums import add_forces, add_stiffnesses, pair_energy
 from solver.membrane.geometry import Geometry, Membranes
 from solver.model import Positive
 from solver.pair_potentials import PAIR_POTENTIALS, PairPotential, PowerLaw
-from solver.pair_potentials.base import Derivatives, Formula
+from solver.pair_potentials.pair_potential import Derivatives, Formula
 from solver.parallel import SERIAL
 from solver.potentials.neighbors import Neighbors
 from solver.potentials.proximity import Closeness, Proximity
