@@ -32,14 +32,6 @@ FORBIDDEN = {
     },
     "ensemble": {"api", "fastapi", "uvicorn"},
 }
-# The folders and modules of a package; none imports one that stands after it.
-LEVELS = {
-    "solver": (
-        *("compilation", "model", "registry", "revision", "parallel"),
-        *("flows", "pair_potentials", "scene"),
-        *("membrane", "potentials", "forces", "motion", "integrators", "analysis", "simulation"),
-    ),
-}
 
 # Folders and modules directly in each package, from the lowest.  Those of one line do not import each other.
 ORDER = {
@@ -197,38 +189,6 @@ def test_dependencies_point_one_way(package: str) -> None:
         for path in modules
         for name in imports(path.read_text(encoding="utf-8"))
         if name.split(".")[0] in FORBIDDEN[package]
-    ]
-    assert not offences
-
-
-def parts(package: str, source: str) -> Iterator[str]:
-    """Names of all folders or modules of a package that a piece of source imports something from."""
-    for node in ast.walk(ast.parse(source)):
-        if isinstance(node, ast.ImportFrom) and node.module == package:
-            yield from (name.name for name in node.names)
-    for name in imports(source):
-        top, *rest = name.split(".")
-        if top == package and rest:
-            yield rest[0]
-
-
-def test_the_reader_of_parts_sees_every_form() -> None:
-    source = "import a.b.c, b.d\nfrom a import e, f\nfrom a.g.h import i\nimport a\n"
-    assert list(parts("a", source)) == ["e", "f", "b", "g"]
-
-
-@pytest.mark.parametrize("package", LEVELS)
-def test_no_folder_imports_a_later_one(package: str) -> None:
-    level = {name: number for number, name in enumerate(LEVELS[package])}
-    modules = [path for path in sorted((ROOT / package).rglob("*.py")) if path.parent.name != package]
-    modules += [path for path in (ROOT / package).glob("*.py") if path.name != "__init__.py"]
-    found = {path.relative_to(ROOT / package).parts[0].removesuffix(".py") for path in modules}
-    assert found == level.keys() & found, "a folder without a level"
-    offences = [
-        f"{path.relative_to(ROOT)} imports {name}"
-        for path in modules
-        for name in parts(package, path.read_text(encoding="utf-8"))
-        if level[name] > level[path.relative_to(ROOT / package).parts[0].removesuffix(".py")]
     ]
     assert not offences
 
