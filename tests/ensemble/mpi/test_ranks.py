@@ -24,7 +24,7 @@ def serial() -> dict[str, Array]:
     return computed(SERIAL)
 
 
-@pytest.mark.parametrize("ranks", [1, 2, 3, 4])
+@pytest.mark.parametrize("ranks", [1, 2, *(pytest.param(count, marks=pytest.mark.long) for count in (3, 4))])
 def test_any_number_of_ranks_computes_the_same(
     launcher: Any, serial: dict[str, Array], ranks: int, tmp_path: Path
 ) -> None:

@@ -15,8 +15,9 @@ import psutil
 import pytest
 
 from ensemble.store import Store
+from tests.ensemble.mpi.launched_ranks import ranks_of
 
-SECONDS_TO_DIE = 5
+SECONDS_TO_DIE = 60  # far less on a machine that has nothing else to do
 
 
 def points(document: dict[str, Any]) -> list[tuple[Any, Any, Any, Any]]:
@@ -32,7 +33,7 @@ def made(store: Path) -> dict[str, str]:
         return {summary.key: summary.created.isoformat() for summary in opened.summaries()}
 
 
-@pytest.mark.parametrize("ranks", [1, 3])
+@pytest.mark.parametrize("ranks", [pytest.param(1, marks=pytest.mark.long), 3])
 def test_any_number_of_ranks_finds_the_same_brackets(
     launcher, bisect_command, finished_study, tmp_path, ranks
 ):
@@ -50,7 +51,7 @@ def test_without_a_launcher_it_is_the_same_study(ensemble, bisect_command, finis
 
 def test_both_ranks_simulate(finished_study):
     assert 0 < finished_study.document["busy_fraction"] <= 1
-    assert finished_study.document["busy_fraction"] > 0.5, "one busy rank of two makes at most a half"
+    assert "2 running" in finished_study.progress
 
 
 def test_a_finished_study_runs_nothing(launcher, bisect_command, finished_study):
@@ -63,6 +64,7 @@ def test_a_finished_study_runs_nothing(launcher, bisect_command, finished_study)
     assert made(finished_study.store) == before
 
 
+<<<<<<< HEAD
 def ranks_of(launched: subprocess.Popen[str]) -> dict[int, psutil.Process]:
     ranks = {}
     for process in psutil.Process(launched.pid).children(recursive=True):
@@ -72,6 +74,8 @@ def ranks_of(launched: subprocess.Popen[str]) -> dict[int, psutil.Process]:
     return ranks
 
 
+=======
+>>>>>>> 4ea88db (Tests: two processes by default; no limit of time that a busy machine misses; kills and long runs of ranks in the second tier)
 def helper_of(launched: subprocess.Popen[str]) -> psutil.Process:
     return ranks_of(launched)[0].parent()
 
@@ -84,7 +88,10 @@ VICTIMS = {
 }
 
 
-@pytest.mark.parametrize("victim", VICTIMS)
+@pytest.mark.parametrize(
+    "victim",
+    ["launcher", *(pytest.param(name, marks=pytest.mark.long) for name in ("helper", "rank 0", "rank 1"))],
+)
 def test_a_killed_study_leaves_no_process_and_continues_to_the_same_brackets(
     launcher, bisect_command, finished_study, tmp_path, victim
 ):
@@ -95,7 +102,7 @@ def test_a_killed_study_leaves_no_process_and_continues_to_the_same_brackets(
         while not (store / "runs").is_dir() or len(list((store / "runs").iterdir())) < 2:
             assert launched.poll() is None
             time.sleep(0.02)
-        time.sleep(random.Random(victim).uniform(0, 1.0))
+        time.sleep(random.Random(victim).uniform(0, 0.3))
         family = psutil.Process(launched.pid).children(recursive=True)
         VICTIMS[victim](launched).send_signal(signal.SIGKILL)
         _, alive = psutil.wait_procs(family, timeout=SECONDS_TO_DIE)
@@ -108,7 +115,7 @@ def test_a_killed_study_leaves_no_process_and_continues_to_the_same_brackets(
         launched.wait()
 
     kept = made(store)
-    assert kept
+    assert 0 < len(kept) < len(made(finished_study.store)), "it was not killed in the middle"
     result = launcher.run(2, bisect_command(store))
     assert result.returncode == 0, result.stderr
     assert points(json.loads(result.stdout)) == points(finished_study.document)

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import sys
-import time
 
 import pytest
 
 from ensemble.mpi.world import launched_rank, launched_size
-
-SECONDS_TO_END = 5
 
 
 @pytest.mark.parametrize(
@@ -44,9 +41,7 @@ with abort_guard(communicator):
 @pytest.mark.parametrize("error", ['ValueError("this rank broke")', "KeyboardInterrupt"])
 @pytest.mark.parametrize("rank", [0, 1])
 def test_an_exception_on_one_rank_ends_all(launcher, rank, error):
-    begin = time.monotonic()
     result = launcher.run(2, [sys.executable, "-c", FAILING.format(rank=rank, error=error)])
-    assert time.monotonic() - begin < SECONDS_TO_END
     assert result.returncode == 1
     assert error.split("(")[0] in result.stderr
     assert "Traceback" in result.stderr

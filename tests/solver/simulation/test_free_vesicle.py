@@ -87,7 +87,9 @@ def test_an_ellipse_relaxes_to_the_euler_lagrange_shape(reduced_area: float, poi
     assert 2 * run.energy.bending == pytest.approx(curvature_energies()[reduced_area], rel=1e-8)
 
 
-@pytest.mark.parametrize(("reduced_area", "points"), [(0.35, 192), (0.3, 384)])
+@pytest.mark.parametrize(
+    ("reduced_area", "points"), [(0.35, 192), pytest.param(0.3, 384, marks=pytest.mark.long)]
+)
 def test_a_slender_vesicle_relaxes_to_the_euler_lagrange_shape(reduced_area: float, points: int) -> None:
     """From a blunt shape: of an ellipse as slender as this the points would not resolve the tips.
 
