@@ -16,7 +16,7 @@ from uuid import uuid4
 from sqlalchemy import URL
 
 ROOT = 0
-SECONDS_TO_START = 20
+SECONDS_TO_START = 120
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from api.database.service_database import Database
 from api.serve import open_service, server_configuration
 from api.settings import Settings
 
-SECONDS_TO_START = 20
+SECONDS_TO_START = 120
 
 
 def make_token(store: Path, user: str, scope: TokenScope, lifetime: timedelta = timedelta(hours=1)) -> str:

@@ -64,18 +64,6 @@ def test_a_finished_study_runs_nothing(launcher, bisect_command, finished_study)
     assert made(finished_study.store) == before
 
 
-<<<<<<< HEAD
-def ranks_of(launched: subprocess.Popen[str]) -> dict[int, psutil.Process]:
-    ranks = {}
-    for process in psutil.Process(launched.pid).children(recursive=True):
-        environment = process.environ()
-        if "PMI_RANK" in environment and "ensemble" in process.cmdline():
-            ranks[int(environment["PMI_RANK"])] = process
-    return ranks
-
-
-=======
->>>>>>> 4ea88db (Tests: two processes by default; no limit of time that a busy machine misses; kills and long runs of ranks in the second tier)
 def helper_of(launched: subprocess.Popen[str]) -> psutil.Process:
     return ranks_of(launched)[0].parent()
 
@@ -88,10 +76,11 @@ VICTIMS = {
 }
 
 
-@pytest.mark.parametrize(
-    "victim",
-    ["launcher", *(pytest.param(name, marks=pytest.mark.long) for name in ("helper", "rank 0", "rank 1"))],
-)
+# One in the first tier: the launcher, which ends nothing else by dying; ranks of a group: test_groups.
+OTHERS = [pytest.param(name, marks=pytest.mark.long) for name in VICTIMS if name != "launcher"]
+
+
+@pytest.mark.parametrize("victim", ["launcher", *OTHERS])
 def test_a_killed_study_leaves_no_process_and_continues_to_the_same_brackets(
     launcher, bisect_command, finished_study, tmp_path, victim
 ):
