@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -42,3 +43,14 @@ def test_a_scene_needs_neither_scipy_nor_compiled_kernels() -> None:
 def test_a_name_loads_only_what_it_needs() -> None:
     assert "solver.scene" not in loaded_by("import solver")
     assert "numba" in loaded_by("from solver import simulate")
+
+
+def test_the_example_of_the_readme_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    (example,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text("utf-8"), re.DOTALL)
+    assert len(example.splitlines()) <= 11
+    exec(compile(example, "README.md", "exec"), {})
+    outcome, period = capsys.readouterr().out.split()
+    promised = re.search(r"# (\S+) (\S+)\n\Z", example)
+    assert promised
+    assert outcome == promised[1]
+    assert f"{float(period):.2f}" == promised[2]
