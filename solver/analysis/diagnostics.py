@@ -13,7 +13,7 @@ from solver.membrane import curve
 from solver.membrane.geometry import Membranes
 from solver.membrane.symmetry import independent_vesicles
 from solver.motion.equation import EquationOfMotion, Motion
-from solver.potentials.proximity import gap
+from solver.potentials.neighbors import gap
 from solver.scene import Scene, Vesicle
 
 Array = NDArray[np.float64]
@@ -79,7 +79,7 @@ def measures(scene: Scene, equation: EquationOfMotion) -> dict[str, Measure]:
         measured["inclination_angle"] = lambda motion: float(curve.inclination(motion.geometry.points[:, 0]))
     shear_rate = scene.flow.shear_rate if scene.flow else None
     if shear_rate:
-        area = equation.membranes.copies * target_area.sum()
+        area = equation.membranes.multiplicity * target_area.sum()
         measured |= _viscosities(equation, 1 / (shear_rate * area))
     return measured
 

@@ -155,7 +155,7 @@ class Recorder:
 
     def _keep(self, time: float, state: Array, motion: Motion) -> None:
         membranes = self._membranes
-        tension = np.tile(motion.tension, (membranes.copies, 1))
+        tension = np.tile(motion.tension, (membranes.multiplicity, 1))
         self._frames.append(
             (time, membranes.curve_tangent_angle(state), membranes.curve_center(state), tension)
         )

@@ -30,7 +30,7 @@ def shear_stress(geometry: Geometry, density: Array) -> float:
         Over all membranes, images included.
     """
     moment = np.sum(density[0] * geometry.points[1], axis=1)
-    return float(-geometry.membranes.copies * np.sum(moment * geometry.membranes.spacing))
+    return float(-geometry.membranes.multiplicity * np.sum(moment * geometry.membranes.spacing))
 
 
 def membrane_stress(motion: Motion) -> float:

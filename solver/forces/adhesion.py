@@ -17,7 +17,7 @@ from solver.forces.pair_formulas import formula_and_parameters
 from solver.forces.pair_sums import add_density, add_stiffness, fill_hessian, summed_energy
 from solver.membrane.geometry import Geometry, Membranes
 from solver.membrane.spectral import interpolations
-from solver.pair_potentials import PairPotential
+from solver.pair_potentials.pair_potential import PairPotential
 from solver.pair_potentials.cutoff import switch_error
 from solver.parallel import SERIAL, Parallel, Shares
 from solver.potentials.proximity import Proximity
@@ -246,7 +246,7 @@ class DirectAdhesion:
         """
         membranes = geometry.membranes
         size = membranes.count * membranes.points
-        hessian = np.empty((2, size, 2, membranes.copies * size))
+        hessian = np.empty((2, size, 2, membranes.multiplicity * size))
         shares, sums = self._sums(geometry, closeness)
         fill_hessian(*sums, self._hamaker, hessian)
         own = hessian[:, shares.own]
@@ -353,4 +353,4 @@ def total_energy(parallel: Parallel, geometry: Geometry, energy: float) -> float
     float
     """
     each = parallel.divide(parallel.size).gather(np.array([energy]))
-    return float(geometry.membranes.copies * each.sum())
+    return float(geometry.membranes.multiplicity * each.sum())

@@ -72,7 +72,8 @@ class Bending:
         """
         curvature_vector = geometry.arclength_derivative(geometry.tangents)
         square = np.sum(curvature_vector**2, axis=(0, 2)) * geometry.membranes.spacing
-        return float(0.5 * geometry.membranes.copies * np.sum(geometry.membranes.bending_modulus * square))
+        membranes = geometry.membranes
+        return float(0.5 * membranes.multiplicity * np.sum(membranes.bending_modulus * square))
 
 
 class BendingOfCircles(Bending):

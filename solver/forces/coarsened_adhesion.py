@@ -1,7 +1,7 @@
 """Adhesion among many vesicles, all points of which act on all points of the others.
 
-Between vesicles that are far apart the trapezoid rule needs few points: every second one serves, farther
-still every fourth, and so on.  For targets near a vesicle the difference between the sums over its refined
+Between vesicles that are far apart the trapezoid rule needs few points: every second one, farther still every
+fourth, and so on.  For targets near a vesicle the difference between the sums over its refined
 points and over its points is added.
 """
 
@@ -25,7 +25,7 @@ from solver.forces.pair_sums import (
     summed_energy,
 )
 from solver.membrane.geometry import Geometry, Membranes
-from solver.pair_potentials import PairPotential
+from solver.pair_potentials.pair_potential import PairPotential
 from solver.parallel import Parallel, Shares
 from solver.potentials.proximity import Proximity
 from solver.potentials.refinement import sum_costs, within

@@ -17,9 +17,8 @@ from numba import types
 from numba.extending import NativeValue, models, overload, register_model, typeof_impl, unbox
 
 from solver.compilation import compiled
-from solver.pair_potentials import PairPotential
 from solver.pair_potentials.cutoff import truncate
-from solver.pair_potentials.pair_potential import Derivatives, Formula
+from solver.pair_potentials.pair_potential import Derivatives, Formula, PairPotential
 
 _FORMULAS: dict[str, Formula] = {}  # by the name that their types have
 
@@ -80,7 +79,7 @@ def derivatives(formula: PairFormula, square: float, parameters: Any) -> Derivat
     NotImplementedError
         Outside of compiled code; there `PairPotential.evaluate` does this.
     """
-    raise NotImplementedError("compiled loops alone may call this: use PairPotential.evaluate")
+    raise NotImplementedError("only compiled loops call this; elsewhere use PairPotential.evaluate")
 
 
 class _FormulaType(types.Type):

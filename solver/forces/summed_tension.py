@@ -36,16 +36,16 @@ class Preconditioner(NamedTuple):
 
 
 @compiled
-def _image(tangents: Array, shifts: Array, tension: Array, gradient: Array) -> Array:
+def _response(tangents: Array, shifts: Array, tension: Array, gradient: Array) -> Array:
     """Return the mean of each tension (m, N) times its shift, minus the stretching of its velocity."""
-    image = np.empty_like(tension)
+    response = np.empty_like(tension)
     for vesicle in range(tension.shape[0]):
         shift = shifts[vesicle, 0] * tension[vesicle].mean()
         for i in range(tension.shape[1]):
             stretching = tangents[0, vesicle, i] * gradient[0, vesicle, i]
             stretching += tangents[1, vesicle, i] * gradient[1, vesicle, i]
-            image[vesicle, i] = shift - stretching
-    return image
+            response[vesicle, i] = shift - stretching
+    return response
 
 
 class SummedInextensibility:
@@ -121,7 +121,7 @@ class SummedInextensibility:
         if flow is not None:
             velocity += flow[:, own]
         gradient = velocity @ derivative
-        residual = -_image(tangents, shifts, tension, gradient)
+        residual = -_response(tangents, shifts, tension, gradient)
         direction = precondition(residual)
         strain_x, strain_y, square, product = total(
             (gradient[0], gradient[0]),
@@ -136,11 +136,11 @@ class SummedInextensibility:
                 break
             self.iterations += 1
             change = layer.velocity(pull(direction))
-            image = _image(tangents, shifts, direction, change @ derivative)
-            step = product / total((direction, image))[0]
+            response = _response(tangents, shifts, direction, change @ derivative)
+            step = product / total((direction, response))[0]
             tension += step * direction
             velocity += step * change
-            residual -= step * image
+            residual -= step * response
             correction = precondition(residual)
             previous = product
             square, product = total((residual, residual), (residual, correction))

@@ -1,4 +1,4 @@
-"""Membrane tension from local inextensibility: x_s · u_s = 0.
+"""Membrane tension from local inextensibility, x_s · u_s = 0 (Quaife et al. 2019, eq. 1).
 
 A tension σ exerts the force (σ x_s)_s; the velocity it causes must cancel the stretching that all other
 forces and the flow cause.  With T σ = (σ x_s)_s, S the single-layer potential and Div u = x_s · u_s,
@@ -7,7 +7,7 @@ forces and the flow cause.  With T σ = (σ x_s)_s, S the single-layer potential
 
 Since Div = −T* and S is symmetric and positive, so is A (weighted with the spacing): conjugate gradients,
 preconditioned with the dense inverse from the last Jacobian.  That inverse stays good while the membranes
-move, because A does not change when a membrane is turned or shifted.
+move, because A does not change when a membrane is rotated or shifted.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from solver.membrane.spectral import differentiation
 
 Array = NDArray[np.float64]
 
-ROUND_OFF = 1e-15  # the least `Inextensibility.elasticity` that means anything
+ROUND_OFF = 1e-15  # the least elasticity (`Inextensibility`) that rounding leaves a meaning
 
 
 class TensionNotFoundError(ArithmeticError):
@@ -34,7 +34,10 @@ class TensionNotFoundError(ArithmeticError):
 class Mobility(Protocol):
     """How point forces move the membranes: the single-layer potential, or what a contrast makes of it.
 
-    matrix : (2·M·N, 2·M·N), symmetric up to quadrature error
+    Attributes
+    ----------
+    matrix : (2·M·N, 2·M·N)
+        From point forces to velocities, x-components first; symmetric up to quadrature error.
     """
 
     matrix: Array
@@ -118,14 +121,14 @@ def _conjugate_gradients(
         forces = np.dot(pull, derivative).reshape(imposed.shape) * weight
         change = np.dot(layer, forces.reshape(2 * size))
         gradient = np.dot(change.reshape(2 * count, points), derivative).reshape(imposed.shape)
-        image = (-(tangents[0] * gradient[0] + tangents[1] * gradient[1]) * weight).reshape(size)
+        response = (-(tangents[0] * gradient[0] + tangents[1] * gradient[1]) * weight).reshape(size)
         for vesicle in range(count):
             own = slice(vesicle * points, (vesicle + 1) * points)
-            image[own] += shifts[vesicle] * direction[own].mean()
-        step = product / np.dot(direction, image)
+            response[own] += shifts[vesicle] * direction[own].mean()
+        step = product / np.dot(direction, response)
         solution += step * direction
         flow += step * change
-        residual -= step * image
+        residual -= step * response
         correction = np.dot(inverse, residual)
         previous = product
         product = np.dot(residual, correction)
@@ -181,8 +184,8 @@ class Inextensibility:
         -------
         Inextensible
         TensionInverse
-            The one that served: the known one, or that of this geometry if there was none or if the iteration
-            with it was too slow.
+            The one that was used: the known one, or that of this geometry if there was none or if the
+            iteration with it was too slow.
 
         Raises
         ------
@@ -193,7 +196,7 @@ class Inextensibility:
             if inverse is None:
                 inverse, _ = self.factorize(layer, geometry)
             membranes = geometry.membranes
-            found = Inextensible(
+            motion = Inextensible(
                 np.empty(imposed.shape[1:]), np.empty(imposed.shape), np.empty(imposed.shape[1:])
             )
             iterations = _conjugate_gradients(
@@ -208,11 +211,11 @@ class Inextensibility:
                 membranes.natural_rate,
                 limit,
                 imposed,
-                *found,
+                *motion,
             )
             if iterations >= 0:
                 self.iterations += iterations
-                return found, inverse
+                return motion, inverse
         raise TensionNotFoundError("the tension could not be found: the membrane is too distorted")
 
     def factorize(self, layer: Mobility, geometry: Geometry) -> tuple[TensionInverse, Array]:
@@ -251,7 +254,7 @@ class Inextensibility:
         for vesicle in range(count):
             block = slice(vesicle * points, (vesicle + 1) * points)
             system[block, block] += (shifts[vesicle] + highest) / points
-        # The lower triangle is used alone: the operator is symmetric up to quadrature error.
+        # Only the lower triangle is used: the operator is symmetric up to quadrature error.
         factor, failed = lapack.dpotrf(system.T, lower=0, overwrite_a=1)
         if failed:
             raise TensionNotFoundError("the tension operator is not positive: the membrane is too distorted")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,19 +14,22 @@ from solver.compilation import compiled
 from solver.membrane import curve
 from solver.membrane.spectral import differentiation, integration
 from solver.membrane.symmetry import independent_vesicles
-from solver.scene import Scene, Vesicle
+
+if TYPE_CHECKING:
+    from solver.scene import Scene, Vesicle
 
 Array = NDArray[np.float64]
 
-ROUNDNESS = 1e-9  # deviation of the reduced area from 1 that is next to none: of the curvature, 3e-5
+# A vesicle whose reduced area is less than this below 1 is circular: its curvature varies by 3e-5 at most.
+ROUNDNESS = 1e-9
 
 
 @dataclass(frozen=True)
 class Membranes:
     """What stays the same during a run: M vesicles with N points each, and perhaps their images.
 
-    With ``copies`` = 2 every vesicle has an image (`solver.membrane.symmetry`).  The C = copies·M curves in
-    the fluid are the vesicles and then the images, in the same order.
+    With the multiplicity 2 every vesicle has an image (`solver.membrane.symmetry`).  The C = multiplicity·M
+    curves in the fluid are the vesicles and then the images, in the same order.
 
     Attributes
     ----------
@@ -34,8 +37,8 @@ class Membranes:
         N, on each vesicle.
     length, bending_modulus : (M,)
     circular : (M,) of bool
-        Which vesicles have no area to spare: circles, up to `ROUNDNESS`.
-    copies : int
+        Which vesicles are circles, up to `ROUNDNESS`.
+    multiplicity : int
         1, or 2 with images.
     """
 
@@ -43,10 +46,10 @@ class Membranes:
     length: Array
     bending_modulus: Array
     circular: NDArray[np.bool_]
-    copies: int = 1
+    multiplicity: int = 1
 
     @classmethod
-    def of(cls, vesicles: Sequence[Vesicle], points: int, copies: int = 1) -> Self:
+    def of(cls, vesicles: Sequence[Vesicle], points: int, multiplicity: int = 1) -> Self:
         """Make the membranes of these vesicles.
 
         Parameters
@@ -54,7 +57,7 @@ class Membranes:
         vesicles : sequence of Vesicle
         points : int
             On each vesicle.
-        copies : int
+        multiplicity : int
             1, or 2 with images.
 
         Returns
@@ -66,7 +69,7 @@ class Membranes:
             np.array([vesicle.length for vesicle in vesicles]),
             np.array([vesicle.bending_modulus for vesicle in vesicles]),
             np.array([vesicle.reduced_area > 1 - ROUNDNESS for vesicle in vesicles]),
-            copies,
+            multiplicity,
         )
 
     @classmethod
@@ -102,7 +105,7 @@ class Membranes:
     @property
     def curves(self) -> int:
         """Number of vesicles and images."""
-        return self.copies * self.count
+        return self.multiplicity * self.count
 
     @cached_property
     def spacing(self) -> Array:
@@ -112,7 +115,7 @@ class Membranes:
     @cached_property
     def curve_spacing(self) -> Array:
         """`spacing` of all curves, (C,)."""
-        return np.tile(self.spacing, self.copies)
+        return np.tile(self.spacing, self.multiplicity)
 
     @cached_property
     def wavenumber(self) -> Array:
@@ -185,7 +188,7 @@ class Membranes:
         (..., C, N)
         """
         angle = self.tangent_angle(state)
-        return np.concatenate([angle, angle + np.pi], axis=-2) if self.copies == 2 else angle
+        return np.concatenate([angle, angle + np.pi], axis=-2) if self.multiplicity == 2 else angle
 
     def curve_center(self, state: Array) -> Array:
         """Return the centers of all curves.
@@ -213,7 +216,7 @@ class Membranes:
         -------
         (..., C, ...)
         """
-        return np.concatenate([vectors, -vectors], axis=axis) if self.copies == 2 else vectors
+        return np.concatenate([vectors, -vectors], axis=axis) if self.multiplicity == 2 else vectors
 
     def fold(self, columns: Array) -> Array:
         """Make operators that act on vectors on the vesicles from those that act on all curves.
@@ -229,12 +232,12 @@ class Membranes:
         (..., M·N)
         """
         size = self.count * self.points
-        return columns[..., :size] - columns[..., size:] if self.copies == 2 else columns
+        return columns[..., :size] - columns[..., size:] if self.multiplicity == 2 else columns
 
 
 @compiled
 def _place(
-    tangent_angle: Array, centers: Array, wavenumber: Array, integration: Array, copies: int
+    tangent_angle: Array, centers: Array, wavenumber: Array, integration: Array, multiplicity: int
 ) -> tuple[Array, Array, Array, Array]:
     """Make the arrays of `Geometry`: tangents and points, of the vesicles and of all curves."""
     count, n = tangent_angle.shape
@@ -249,7 +252,7 @@ def _place(
             for j in range(n):
                 points[component, vesicle, j] /= wavenumber[vesicle, 0]
                 points[component, vesicle, j] += centers[component, vesicle]
-    if copies == 1:
+    if multiplicity == 1:
         return tangents, points, tangents, points
     curve_tangents, curve_points = np.empty((2, 2 * count, n)), np.empty((2, 2 * count, n))
     curve_tangents[:, :count], curve_tangents[:, count:] = tangents, -tangents
@@ -293,7 +296,7 @@ class Geometry:
             self.centers,
             membranes.wavenumber,
             integration(membranes.points),
-            membranes.copies,
+            membranes.multiplicity,
         )
 
     @property

@@ -8,8 +8,10 @@ among both.
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
-from solver.scene import Scene, Vesicle
+if TYPE_CHECKING:
+    from solver.scene import Scene, Vesicle
 
 
 def has_images(scene: Scene) -> bool:

@@ -1,9 +1,9 @@
 """The single-layer potential of one membrane at points outside it, however close to it they lie.
 
-Barnett, Wu & Veerapaneni 2015 reduce the Stokes potential to Cauchy integrals, take the boundary values of
-these from outside, where they are smooth, and continue them to the target by a barycentric sum, whose error
-does not depend on how close the target is.  In complex numbers, with r = x − y from a point y of the membrane
-to the target x,
+For targets that are not very close the source is refined.  For closer ones Barnett, Wu & Veerapaneni 2015
+reduce the Stokes potential to Cauchy integrals, take the boundary values of these from outside, where they
+are smooth, and continue them to the target by a barycentric sum, whose error does not depend on how close the
+target is.  In complex numbers, with r = x − y from a point y of the membrane to the target x,
 
     r⊗r/r² = ½ I + ½ [[Re w, −Im w], [−Im w, −Re w]],    w = conj(r)/r,
 
@@ -26,7 +26,8 @@ from numpy.typing import NDArray
 from solver.compilation import compiled
 from solver.membrane.spectral import logarithm_weights
 from solver.potentials.logarithm import logarithm
-from solver.potentials.refinement import LARGEST_REFINED, Refinement
+from solver.potentials.refinement import LARGEST_REFINED, Refinement, interpolation_to, refined_points
+from solver.potentials.stokeslets import stokeslets
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -264,6 +265,39 @@ def close_stokeslets(
 
 
 @compiled
+def refine_single_layer(points: Array, refinement: Refinement, components: Array, first: int) -> None:
+    """Replace the rows of components for targets that need a factor up to `LARGEST_REFINED`.
+
+    Refined columns are folded back to the curve's own points.  For closer targets `close_single_layer`
+    costs less.
+
+    Parameters
+    ----------
+    points : (2, C, n)
+        Of all curves.
+    refinement : Refinement
+    components : (3, ·, C·n)
+        As of `stokeslets`, changed in place.
+    first : int
+        Number of the point in the first row.
+    """
+    n = points.shape[2]
+    for g in range(refinement.groups.shape[0]):
+        target, source, factor = refinement.groups[g]
+        if factor == 1 or factor > LARGEST_REFINED:
+            continue
+        rows = refinement.rows[refinement.starts[g] : refinement.starts[g + 1]]
+        fine = refined_points(points, source, factor, refinement)
+        refined = np.empty((3, rows.size, fine.shape[1]))
+        stokeslets(points[:, target][:, rows], fine, refined)
+        for component in range(3):
+            folded = np.dot(refined[component], interpolation_to(refinement, factor))
+            for k in range(rows.size):
+                row = target * n + rows[k] - first
+                components[component, row, source * n : (source + 1) * n] = folded[k] / factor
+
+
+@compiled
 def close_single_layer(
     points: Array,
     tangents: Array,
@@ -274,7 +308,7 @@ def close_single_layer(
     components: Array,
     first: int,
 ) -> None:
-    """Replace the rows of components for targets too close for `refinement.refine_single_layer`.
+    """Replace the rows of components for targets too close for `refine_single_layer`.
 
     Parameters
     ----------

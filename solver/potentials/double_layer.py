@@ -9,8 +9,9 @@ leaves
 
 that is, Laplace's double layer P of each component, and the integral that is the part of the single layer
 without its logarithm (`close_evaluation`).  The matrix of the single layer holds w at any distance, so only P
-is left to integrate.  On its own membrane P is smooth.  On another one the trapezoid rule serves targets that
-are a few spacings away, and a barycentric Cauchy sum those that are closer (Barnett, Wu & Veerapaneni 2015).
+is left to integrate.  On its own membrane P is smooth.  On another one it is integrated by the trapezoid rule
+for targets that are a few spacings away, and by a barycentric Cauchy sum for those that are closer (Barnett,
+Wu & Veerapaneni 2015).
 """
 
 from __future__ import annotations
@@ -226,7 +227,7 @@ class DoubleLayer:
     def __init__(self, membranes: Membranes, accuracy: float) -> None:
         self._ratio = required_ratio(1.0, accuracy)
         size = membranes.count * membranes.points
-        self._laplace = np.empty((size, membranes.copies * size))
+        self._laplace = np.empty((size, membranes.multiplicity * size))
         self.matrix = np.empty((2 * size, 2 * size))
 
     def assemble(self, geometry: Geometry, closeness: Closeness | None, single_layer: Array) -> None:
@@ -278,8 +279,8 @@ class DoubleLayer:
         """
         membranes = geometry.membranes
         size = membranes.count * membranes.points
-        by_points = np.empty((2, size, 2, membranes.copies * size))
-        by_angle = np.empty((2, size, membranes.copies * size))
+        by_points = np.empty((2, size, 2, membranes.multiplicity * size))
+        by_angle = np.empty((2, size, membranes.multiplicity * size))
         slope = geometry.arclength_derivative(velocity) * membranes.spacing[:, None]
         double_layer_derivatives(
             geometry.curve_points,
@@ -292,7 +293,7 @@ class DoubleLayer:
         )
         by_state = geometry.by_state(membranes.fold(by_points))
         # An image rotates as its vesicle does.
-        by_state[:, :, :size] += by_angle.reshape(2, size, membranes.copies, size).sum(axis=2)
+        by_state[:, :, :size] += by_angle.reshape(2, size, membranes.multiplicity, size).sum(axis=2)
         return by_state
 
     def _replace_close(self, geometry: Geometry, closeness: Closeness) -> None:

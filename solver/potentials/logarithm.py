@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any
 
 import numpy as np
 from llvmlite import ir
 from numba import njit, types
 from numba.extending import intrinsic
-
-from solver.compilation import compiled
 
 _SQRT_HALF_BITS = 0x3FE6A09E667F3BCD
 _EXPONENT = ~((1 << 52) - 1)
@@ -53,8 +50,8 @@ def _double_of(typing_context: Any, bits: Any) -> Any:
     return types.float64(types.int64), generate
 
 
-# Not reassociated: x·m ± x keeps its rounding.
-@partial(njit, cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+# Not reassociated: x·m ± x keeps its rounding.  Not cached either: it is part of functions that are.
+@njit(nogil=True, error_model="numpy", fastmath={"contract"})
 def logarithm_and_reciprocal(x: float) -> tuple[float, float]:
     """Return log(x)/`LOGARITHM_UNIT` and 1/x, by one division, to 3e-16.
 
@@ -87,7 +84,7 @@ def logarithm_and_reciprocal(x: float) -> tuple[float, float]:
     return exponent + z * series, common * mantissa + common
 
 
-@compiled(inline="always")
+@njit(inline="always")
 def logarithm(x: float) -> float:
     """Return the natural logarithm, to 3e-16.
 

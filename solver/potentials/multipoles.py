@@ -21,7 +21,7 @@ from solver.potentials.logarithm import logarithm
 Array = NDArray[np.float64]
 Orders = NDArray[np.int64]
 
-# Terms up to which the series serve; measured: one costs about as much as the sum over one point.
+# Most terms of a series that is used; measured: one costs about as much as the sum over one point.
 LARGEST_ORDER = 32
 
 

@@ -10,7 +10,7 @@ from solver.compilation import compiled
 from solver.membrane.geometry import Geometry
 from solver.membrane.spectral import interpolation, interpolations
 from solver.potentials.refinement import MAXIMUM_FACTOR, Refinement, group_targets
-from solver.potentials.stokeslets import distances
+from solver.potentials.stokeslets import distances, pair_distances
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -121,13 +121,12 @@ class Neighbors:
         return Refinement(groups, rows, starts, interpolations(self._points, factor))
 
 
-def smallest_gap(geometry: Geometry, refinement: int) -> float:
-    """Return the smallest distance between two membranes.
+def gap(geometry: Geometry, refinement: int = 4) -> float:
+    """Return the smallest distance between two different membranes.
 
     Parameters
     ----------
     geometry : Geometry
-        Without images.
     refinement : int
         Factor by which the points of each membrane are interpolated first.
 
@@ -135,6 +134,21 @@ def smallest_gap(geometry: Geometry, refinement: int) -> float:
     -------
     float
     """
+    membranes = geometry.membranes
+    if membranes.multiplicity == 1:
+        return _gap_of_many(geometry, refinement)
+    matrix = interpolation(membranes.points, refinement).T
+    apart = pair_distances(
+        geometry.curve_points @ matrix,
+        geometry.curve_tangents @ matrix,
+        membranes.curve_spacing / refinement,
+        membranes.count,
+    )
+    return float(apart.min())
+
+
+def _gap_of_many(geometry: Geometry, refinement: int) -> float:
+    """Compute `gap` of vesicles without images."""
     membranes = geometry.membranes
     reach = 2.0
     while not len((near := Neighbors(geometry, reach)).pairs):

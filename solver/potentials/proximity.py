@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.membrane.geometry import Geometry
-from solver.membrane.spectral import interpolation, interpolations
-from solver.potentials.neighbors import smallest_gap
+from solver.membrane.spectral import interpolations
 from solver.potentials.refinement import MAXIMUM_FACTOR, Refinement, group_targets
 from solver.potentials.stokeslets import pair_distances, waists
 
@@ -125,29 +124,3 @@ def waist_error(geometry: Geometry) -> Array:
     """
     waist = waists(geometry.points)
     return np.asarray(2 * np.exp(-2 * np.pi * waist / geometry.membranes.spacing))
-
-
-def gap(geometry: Geometry, refinement: int = 4) -> float:
-    """Return the smallest distance between two different membranes.
-
-    Parameters
-    ----------
-    geometry : Geometry
-    refinement : int
-        Factor by which the points of each membrane are interpolated first.
-
-    Returns
-    -------
-    float
-    """
-    membranes = geometry.membranes
-    if membranes.copies == 1:
-        return smallest_gap(geometry, refinement)
-    matrix = interpolation(membranes.points, refinement).T
-    distances = pair_distances(
-        geometry.curve_points @ matrix,
-        geometry.curve_tangents @ matrix,
-        membranes.curve_spacing / refinement,
-        membranes.count,
-    )
-    return float(distances.min())

@@ -13,13 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.compilation import compiled
-from solver.potentials.stokeslets import stokeslets
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 MAXIMUM_FACTOR = 32  # beyond it the adhesion of a close target is not resolved
-LARGEST_REFINED = 4  # factor up to which refining serves the single layer; measured: from 8 on it is slower
+LARGEST_REFINED = 4  # factor up to which the single layer is refined; measured: from 8 on that is slower
 
 
 class Refinement(NamedTuple):
@@ -199,36 +198,3 @@ def refined_points(points: Array, source: int, factor: int, refinement: Refineme
     """
     coarse = np.ascontiguousarray(points[:, source])
     return coarse if factor == 1 else np.dot(coarse, interpolation_to(refinement, factor).T)
-
-
-@compiled
-def refine_single_layer(points: Array, refinement: Refinement, components: Array, first: int) -> None:
-    """Replace the rows of components for targets that need a factor up to `LARGEST_REFINED`.
-
-    Refined columns are folded back to the curve's own points.  For closer targets `close_evaluation` costs
-    less.
-
-    Parameters
-    ----------
-    points : (2, C, n)
-        Of all curves.
-    refinement : Refinement
-    components : (3, ·, C·n)
-        As of `stokeslets`, changed in place.
-    first : int
-        Number of the point in the first row.
-    """
-    n = points.shape[2]
-    for g in range(refinement.groups.shape[0]):
-        target, source, factor = refinement.groups[g]
-        if factor == 1 or factor > LARGEST_REFINED:
-            continue
-        rows = refinement.rows[refinement.starts[g] : refinement.starts[g + 1]]
-        fine = refined_points(points, source, factor, refinement)
-        refined = np.empty((3, rows.size, fine.shape[1]))
-        stokeslets(points[:, target][:, rows], fine, refined)
-        for component in range(3):
-            folded = np.dot(refined[component], interpolation_to(refinement, factor))
-            for k in range(rows.size):
-                row = target * n + rows[k] - first
-                components[component, row, source * n : (source + 1) * n] = folded[k] / factor

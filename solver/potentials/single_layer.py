@@ -15,10 +15,10 @@ from solver.membrane.geometry import Geometry, Membranes
 from solver.membrane.spectral import differentiation
 from solver.parallel import SERIAL, Parallel
 from solver.potentials import stokeslets
-from solver.potentials.close_evaluation import close_single_layer, logarithm_correction
+from solver.potentials.close_evaluation import close_single_layer, logarithm_correction, refine_single_layer
 from solver.potentials.proximity import Closeness
 from solver.potentials.quadrature import required_ratio
-from solver.potentials.refinement import LARGEST_REFINED, Refinement, refine_single_layer, sum_costs, within
+from solver.potentials.refinement import LARGEST_REFINED, Refinement, sum_costs, within
 
 Array = NDArray[np.float64]
 
@@ -72,7 +72,7 @@ class SingleLayer:
         points = membranes.points
         size = membranes.count * points
         self._parallel = parallel
-        self._buffer = np.zeros(3 * size * membranes.copies * size)
+        self._buffer = np.zeros(3 * size * membranes.multiplicity * size)
         self.matrix = np.zeros((2 * size, 2 * size))
         self._correction = logarithm_correction(points)
         self._diagonal = self._correction[0, 0] - np.log(membranes.length / (2 * np.pi)) / (4 * np.pi)
@@ -165,7 +165,7 @@ class SingleLayer:
         size = membranes.count * membranes.points
         shares = self._parallel.divide(size)
         own = shares.own
-        by_points = np.empty((2, own.stop - own.start, 2, membranes.copies * size))
+        by_points = np.empty((2, own.stop - own.start, 2, membranes.multiplicity * size))
         curve_forces = membranes.with_images(point_forces, axis=1).reshape(2, -1)
         stokeslets.stokeslet_derivatives(
             geometry.curve_points.reshape(2, -1), curve_forces, by_points, own.start

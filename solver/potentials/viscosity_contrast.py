@@ -20,7 +20,7 @@ from solver.membrane.geometry import Geometry, Membranes
 from solver.potentials.double_layer import DoubleLayer
 from solver.potentials.proximity import Closeness
 from solver.potentials.single_layer import SingleLayer
-from solver.scene import Vesicle
+from solver.scene.vesicle import Vesicle
 
 Array = NDArray[np.float64]
 
@@ -110,9 +110,9 @@ class ViscosityContrast:
         float
             Over all membranes, images included.
         """
-        inward = geometry.normals
+        membranes, inward = geometry.membranes, geometry.normals
         strain = np.sum(velocity[0] * inward[1] + velocity[1] * inward[0], axis=1)
-        return float(geometry.membranes.copies * np.sum(self._excess * strain * geometry.membranes.spacing))
+        return float(membranes.multiplicity * np.sum(self._excess * strain * membranes.spacing))
 
     def _solve(self, right: Array) -> Array:
         # The factors are of the transposed matrix: LAPACK counts rows and columns the other way.

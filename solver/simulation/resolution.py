@@ -194,7 +194,7 @@ class AdaptiveResolution:
     def _apart(self, geometry: Geometry) -> bool:
         if self._least_distance == 0:
             return True
-        if geometry.membranes.copies > 1:
+        if geometry.membranes.multiplicity > 1:
             return Closeness(geometry).nearest >= self._least_distance
         return Neighbors(geometry, self._least_distance).nearest >= self._least_distance
 

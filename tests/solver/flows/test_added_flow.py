@@ -72,7 +72,7 @@ def test_a_pair_that_a_half_turn_leaves_as_it_is_moves_along() -> None:
     scene = Scene.model_validate(tomllib.loads(DOCUMENT))
     assert not has_images(scene)
     assert has_images(scene.model_copy(update={"flow": None}))
-    assert Membranes.of_scene(scene).copies == 1
+    assert Membranes.of_scene(scene).multiplicity == 1
     run = simulate(scene)
     assert run.outcome is Outcome.UNDECIDED
     assert run.failure is None

@@ -14,7 +14,8 @@ from solver.forces.adhesion import DirectAdhesion
 from solver.forces.pair_formulas import formula_and_parameters
 from solver.forces.pair_sums import add_forces, pair_energy
 from solver.membrane.geometry import Geometry, Membranes
-from solver.potentials.proximity import Closeness, gap
+from solver.potentials.neighbors import gap
+from solver.potentials.proximity import Closeness
 from solver.scene import Numerics, PowerLaw, Scene, Vesicle
 from solver.simulation.initial_state import initial_ellipses
 from tests.solver.references import Ellipse, integrate, nearest_parameter

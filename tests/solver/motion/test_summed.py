@@ -22,8 +22,8 @@ from solver.motion.summed import SummedEquation
 from solver.parallel import SERIAL
 from solver.potentials import multipoles
 from solver.potentials.direct_sum import velocity as direct_velocity
-from solver.potentials.neighbors import Neighbors
-from solver.potentials.proximity import Closeness, gap
+from solver.potentials.neighbors import Neighbors, gap
+from solver.potentials.proximity import Closeness
 from solver.potentials.refinement import LARGEST_REFINED
 from solver.scene import LARGEST_DENSE, Extension, Numerics, PowerLaw, Scene, Shear, Trap, Vesicle
 from solver.simulation.initial_state import initial_ellipses

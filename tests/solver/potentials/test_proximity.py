@@ -7,7 +7,8 @@ import pytest
 
 from solver.membrane.geometry import Geometry
 from solver.membrane.spectral import interpolations
-from solver.potentials.proximity import Closeness, gap
+from solver.potentials.neighbors import gap
+from solver.potentials.proximity import Closeness
 from solver.potentials.refinement import refinement_factors
 from solver.scene import Numerics, Scene, Vesicle
 from tests.solver.references import Ellipse, nearest_parameter

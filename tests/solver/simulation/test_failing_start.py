@@ -7,7 +7,7 @@ import pytest
 
 from solver.analysis.run import LARGEST_SPATIAL, Outcome, Run
 from solver.membrane.geometry import Geometry, Membranes
-from solver.potentials.proximity import gap
+from solver.potentials.neighbors import gap
 from solver.scene import Numerics, PowerLaw, Scene, Shear, Start, Trap, Vesicle
 from solver.simulation.initial_state import initial_ellipses
 from solver.simulation.simulate import simulate
