@@ -17,8 +17,8 @@ from solver.forces.pair_formulas import formula_and_parameters
 from solver.forces.pair_sums import add_density, add_stiffness, fill_hessian, summed_energy
 from solver.membrane.geometry import Geometry, Membranes
 from solver.membrane.spectral import interpolations
-from solver.pair_potentials.pair_potential import PairPotential
 from solver.pair_potentials.cutoff import switch_error
+from solver.pair_potentials.pair_potential import PairPotential
 from solver.parallel import SERIAL, Parallel, Shares
 from solver.potentials.proximity import Proximity
 from solver.potentials.quadrature import required_ratio, trapezoid_error
