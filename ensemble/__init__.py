@@ -6,7 +6,7 @@ nothing.
 The parts, from the lowest to the highest. Each imports only parts that stand before it, and `solver`; a test
 checks this.
 
-1. `errors`, `timestamp`, `disk`: what all parts need
+1. `errors`, `interrupts`, `timestamp`, `disk`: what all parts need
 2. `config`: documents, presets, changes by dotted path, keys of runs
 3. `search`: which run is the most useful one to make next; no MPI, no files
 4. `store`: runs and boundaries on disk

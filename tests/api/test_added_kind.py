@@ -81,7 +81,8 @@ def test_the_command_line_answers_it(launcher, tmp_path):
 def test_the_service_answers_it(store):
     with service(store, "--workers=1") as started, Client(started.url) as client:
         offered = client.get("/kinds").json()["items"]
-        assert [kind["kind"] for kind in offered] == ["study", "scene", "scan"]
+        assert [kind["kind"] for kind in offered] == [kind.kind for kind in kinds()]
+        assert offered[-1]["title"] == ScanQuestion.title
         assert client.estimate(SCAN).runs == 2
         with pytest.raises(Refused, match=r"values: .* must be at most 8"):
             client.estimate(SCAN, {"values": [0.1 * number for number in range(1, 10)]})
