@@ -246,7 +246,7 @@ def test_headers_of_answers_hold_nothing_that_a_client_sent(submitting):
         headers={"Idempotency-Key": "a%0d%0aX-Injected: 1", "X-Forwarded-Host": "evil.example"},
     )
     assert made.status_code == 202
-    assert made.headers["location"] == f"/jobs/{made.json()['id']}"
+    assert made.headers["location"] == f"jobs/{made.json()['id']}"
     assert "injected" not in str(made.headers)
     listed = submitting.get(
         "/jobs", params={"limit": 1, "x": "\r\nX-Injected: 1"}, headers={"Host": "localhost"}

@@ -46,6 +46,7 @@ def test_every_route_is_described(paths):
         ("get", "/runs/{key}/frames"),
         ("get", "/runs/{key}/flow"),
         ("get", "/flows"),
+        ("get", "/kinds"),
         ("get", "/boundaries"),
         ("get", "/boundaries/{key}"),
         ("get", "/boundaries/{key}/at"),

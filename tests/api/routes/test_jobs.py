@@ -72,7 +72,7 @@ def test_a_document_makes_the_same_job_as_its_preset(submitting, kind):
 @pytest.mark.parametrize(
     ("submission", "named"),
     [
-        ({}, "one of preset, study and scene"),
+        ({}, "one of preset, study"),
         ({"preset": "doublet-shear", "scene": {"horizon": 1.0, "vesicles": [{}]}}, "preset and scene"),
         ({"preset": "../../etc/passwd"}, "not a preset"),
         ({"preset": "critical-hamaker", "nonsense": 1}, "nonsense"),
