@@ -27,6 +27,7 @@ class Lattice(Model):
     Attributes
     ----------
     columns, rows : int
+        How many vesicles along x and along y.
     spacing : (2,)
         Distance of neighboring centers along x and y.
     staggered : bool
@@ -75,12 +76,15 @@ class Random(Model):
     Attributes
     ----------
     count : int
+        How many vesicles.
     area_fraction : float
         Area of all vesicles over that of the square.
     seed : int
+        Equal seeds place and draw equal vesicles.
     minimum_distance : float
         Between the ellipses.
     reduced_area, length : float, Uniform or Normal
+        As of `Vesicle`: one value for all, or how the values are distributed.
     angle : float or None
         Of the long axes against x, radians; None for random ones.
     bending_modulus, viscosity_contrast : float

@@ -60,6 +60,7 @@ class Normal(Model):
     Attributes
     ----------
     mean : float
+        Also the median.
     deviation : float
         Standard deviation before the tails are cut off.
     """

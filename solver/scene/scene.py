@@ -36,14 +36,19 @@ class Scene(Model):
         May be given instead of the vesicles.  Validation turns it into these; in a validated scene it is
         None.
     vesicles : tuple of Vesicle
+        At least one.
     adhesion : Adhesion or None
         None if nothing adheres.
     flow : ImposedFlow or None
         None if the fluid is quiescent.
     start : Start
+        How a run begins.
     numerics : Numerics
+        Resolution in space and time.
     criteria : Criteria
+        When a run is decided.
     output : Output
+        How often a run is recorded.
     """
 
     horizon: Positive

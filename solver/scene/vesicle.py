@@ -17,10 +17,13 @@ class Vesicle(Model):
     reduced_area : float
         4π·area/length².
     length : float
+        Perimeter of the membrane.
     bending_modulus : float
+        Stiffness of the membrane against bending.
     viscosity_contrast : float
         Viscosity of the fluid inside over that outside.
     center : (2,)
+        Position, x and y.
     angle : float
         Of the long axis against x, radians.
     """
