@@ -63,13 +63,13 @@ class Process(AbstractContextManager["Process"]):
     ----------
     progress : ProgressLine
         The latest one that the command has written to standard error.
-    last_words : str
+    last_message : str
         The latest other line that it has written there.
     """
 
     def __init__(self, command: Sequence[str], log: Path) -> None:
         self.progress = ProgressLine(fraction=0.0, message="starting")
-        self.last_words = ""
+        self.last_message = ""
         self._output: IO[str] = tempfile.TemporaryFile("w+", encoding="utf-8")  # noqa: SIM115
         self._watcher = subprocess.Popen(
             [sys.executable, "-P", "-m", "api.worker.watcher", *command],
@@ -130,7 +130,7 @@ class Process(AbstractContextManager["Process"]):
         try:
             self.progress = ProgressLine.model_validate_json(line)
         except ValidationError:
-            self.last_words = line.strip() or self.last_words
+            self.last_message = line.strip() or self.last_message
             log.write(line)
         else:
             log.write(f"{self.progress.fraction:4.0%}  {self.progress.message}\n")

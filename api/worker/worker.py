@@ -85,7 +85,7 @@ class Worker:
             if status is None:
                 return
             if status in _OWN_STATUSES:
-                self._finish(lease, job_result(job.kind, status, process.output(), process.last_words))
+                self._finish(lease, job_result(job.kind, status, process.output(), process.last_message))
             else:
                 log.warning("job %s: cut short with status %d", job.id, status)
                 self._jobs.give_back(lease, "its processes were killed; waiting for another attempt")
@@ -125,7 +125,7 @@ class Worker:
             log.info("job %s: %s, %s", lease.job.id, result.status, result.message)
 
 
-def job_result(kind: str, status: int, output: str, last_words: str) -> JobResult:
+def job_result(kind: str, status: int, output: str, last_message: str) -> JobResult:
     """Return how a job has ended, from what its command has done.
 
     Parameters
@@ -136,7 +136,7 @@ def job_result(kind: str, status: int, output: str, last_words: str) -> JobResul
         Exit status of the command.
     output : str
         Standard output: one JSON document, unless the command ended with an error.
-    last_words : str
+    last_message : str
         Last line of standard error.
 
     Returns
@@ -146,6 +146,6 @@ def job_result(kind: str, status: int, output: str, last_words: str) -> JobResul
     try:
         document = json.loads(output)
     except json.JSONDecodeError:
-        return JobResult(JobStatus.FAILED, last_words or f"ended with status {status}")
+        return JobResult(JobStatus.FAILED, last_message or f"ended with status {status}")
     succeeded = JobStatus.SUCCEEDED if status == 0 else JobStatus.FAILED
     return JobResult(succeeded, kind_named(kind).summary(document))

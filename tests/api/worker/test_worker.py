@@ -224,7 +224,7 @@ def test_a_job_that_is_always_cut_short_is_given_up(jobs, store):
 
 
 @pytest.mark.parametrize(
-    ("kind", "status", "output", "last_words", "expected"),
+    ("kind", "status", "output", "last_message", "expected"),
     [
         (
             "scene",
@@ -250,5 +250,5 @@ def test_a_job_that_is_always_cut_short_is_given_up(jobs, store):
         ),
     ],
 )
-def test_how_a_job_has_ended(kind, status, output, last_words, expected):
-    assert job_result(kind, status, output, last_words) == expected
+def test_how_a_job_has_ended(kind, status, output, last_message, expected):
+    assert job_result(kind, status, output, last_message) == expected
