@@ -14,6 +14,7 @@ from solver.compilation import compiled
 from solver.forces.tension import Inextensible, TensionNotFoundError
 from solver.membrane.geometry import Geometry
 from solver.membrane.spectral import differentiation
+from solver.parallel import Shares
 from solver.potentials.summed_single_layer import SummedSingleLayer
 
 Array = NDArray[np.float64]
@@ -46,6 +47,12 @@ def _response(tangents: Array, shifts: Array, tension: Array, gradient: Array) -
             stretching += tangents[1, vesicle, i] * gradient[1, vesicle, i]
             response[vesicle, i] = shift - stretching
     return response
+
+
+def _products(shares: Shares, *pairs: tuple[Array, Array]) -> Array:
+    """Return the products of fields (m, N), summed over all points of all vesicles.  Collective."""
+    sums = [np.einsum("ij,ij->i", first, second) for first, second in pairs]
+    return shares.gather(np.stack(sums, axis=1)).sum(axis=0)
 
 
 class SummedInextensibility:
@@ -111,11 +118,6 @@ class SummedInextensibility:
         def precondition(residual: Array) -> Array:
             return np.asarray((inverses @ residual[:, :, None])[:, :, 0])
 
-        def total(*pairs: tuple[Array, Array]) -> Array:
-            """Products of fields (m, N), summed over all points of all vesicles."""
-            sums = [np.einsum("ij,ij->i", first, second) for first, second in pairs]
-            return shares.gather(np.stack(sums, axis=1)).sum(axis=0)
-
         tension = np.zeros(tangents.shape[1:]) if guess is None else guess[own].copy()
         velocity = layer.velocity(density[:, own] * spacing + pull(tension))
         if flow is not None:
@@ -123,7 +125,8 @@ class SummedInextensibility:
         gradient = velocity @ derivative
         residual = -_response(tangents, shifts, tension, gradient)
         direction = precondition(residual)
-        strain_x, strain_y, square, product = total(
+        strain_x, strain_y, square, product = _products(
+            shares,
             (gradient[0], gradient[0]),
             (gradient[1], gradient[1]),
             (residual, residual),
@@ -137,13 +140,13 @@ class SummedInextensibility:
             self.iterations += 1
             change = layer.velocity(pull(direction))
             response = _response(tangents, shifts, direction, change @ derivative)
-            step = product / total((direction, response))[0]
+            step = product / _products(shares, (direction, response))[0]
             tension += step * direction
             velocity += step * change
             residual -= step * response
             correction = precondition(residual)
             previous = product
-            square, product = total((residual, residual), (residual, correction))
+            square, product = _products(shares, (residual, residual), (residual, correction))
             direction = correction + (product / previous) * direction
         else:
             raise TensionNotFoundError("the tension could not be found: the membranes are too distorted")
