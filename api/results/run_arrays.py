@@ -51,9 +51,9 @@ class FrameSelection:
     ----------
     index : list of int
         Number of each frame in the run.
-    time : (frames,) array
-    position : (frames, vesicles, 2, points) array
-    tension : (frames, vesicles, points) array
+    time : (frames,)
+    position : (frames, vesicles, 2, points)
+    tension : (frames, vesicles, points)
     total : int
         Number of frames of the run.
     """

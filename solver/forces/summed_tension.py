@@ -27,8 +27,8 @@ class Preconditioner(NamedTuple):
 
     Attributes
     ----------
-    inverses : (M, N, N) array
-    shifts : (M, 1) array
+    inverses : (M, N, N)
+    shifts : (M, 1)
         What times the mean tension is added on each.
     """
 
@@ -90,11 +90,11 @@ class SummedInextensibility:
         geometry : Geometry
         preconditioner : Preconditioner
             Of a geometry like this one.
-        density : (2, M, N) array
+        density : (2, M, N)
             Force per length without tension.
-        flow : (2, M, N) array or None
+        flow : (2, M, N) or None
             Imposed velocity.
-        guess : (M, N) array or None
+        guess : (M, N) or None
             Tension with which the iteration begins; zero without.
 
         Returns

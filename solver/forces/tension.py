@@ -48,11 +48,11 @@ class Inextensible(NamedTuple):
 
     Attributes
     ----------
-    tension : (M, N) array
+    tension : (M, N)
         What achieves it.
-    velocity : (2, M, N) array
+    velocity : (2, M, N)
         With that tension.
-    rotation_rate : (M, N) array
+    rotation_rate : (M, N)
         n · u_s, how fast the material turns.
     """
 
@@ -66,9 +66,9 @@ class TensionInverse(NamedTuple):
 
     Attributes
     ----------
-    matrix : (M·N, M·N) array
+    matrix : (M·N, M·N)
         Weighted with the spacing.
-    shifts : (M,) array
+    shifts : (M,)
         What times the mean tension of each vesicle was added to A σ.
     """
 
@@ -175,7 +175,7 @@ class Inextensibility:
         layer : Mobility
             Assembled for the geometry.
         geometry : Geometry
-        imposed : (2, M, N) array
+        imposed : (2, M, N)
             That velocity.
         known : TensionInverse or None
             Of another geometry, preferably one like this.
@@ -230,7 +230,7 @@ class Inextensibility:
         Returns
         -------
         TensionInverse
-        (2, M·N, M·N) array
+        (2, M·N, M·N)
             S T, the velocity of each unit tension.
 
         Raises

@@ -34,11 +34,11 @@ class DifferentialEquation(Protocol):
 
         Parameters
         ----------
-        state : (n,) array
+        state : (n,)
 
         Returns
         -------
-        (n,) array
+        (n,)
         """
 
     def jacobian(self, state: Array) -> Jacobian:
@@ -46,7 +46,7 @@ class DifferentialEquation(Protocol):
 
         Parameters
         ----------
-        state : (n,) array
+        state : (n,)
 
         Returns
         -------
@@ -58,11 +58,11 @@ class DifferentialEquation(Protocol):
 
         Parameters
         ----------
-        state : (n,) array
+        state : (n,)
 
         Returns
         -------
-        (k,) array
+        (k,)
         """
 
 
@@ -73,7 +73,7 @@ class InitialValueProblem:
     Attributes
     ----------
     equation : DifferentialEquation
-    state : (n,) array
+    state : (n,)
         Where the first step begins.
     start : float
         When the first step begins.
@@ -94,7 +94,7 @@ class Step:
     Attributes
     ----------
     start, end : float
-    state : (n,) array
+    state : (n,)
         At the end.
     interpolate : callable
         From a time in [start, end] to the state there, to the method's order.

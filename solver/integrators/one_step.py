@@ -21,9 +21,9 @@ class Linearization:
     Parameters
     ----------
     equation : DifferentialEquation
-    state : (n,) array
+    state : (n,)
         In which the step begins.
-    slope : (n,) array
+    slope : (n,)
         The rate there.
     jacobian : Jacobian
         The derivative of the rate there.
@@ -48,11 +48,11 @@ class Linearization:
 
         Parameters
         ----------
-        state : (n,) array
+        state : (n,)
 
         Returns
         -------
-        (n,) array
+        (n,)
 
         Raises
         ------

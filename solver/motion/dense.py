@@ -114,7 +114,7 @@ class DenseEquation:
 
         Parameters
         ----------
-        state : (state_size,) array
+        state : (state_size,)
 
         Returns
         -------
@@ -129,11 +129,11 @@ class DenseEquation:
 
         Parameters
         ----------
-        state : (state_size,) array
+        state : (state_size,)
 
         Returns
         -------
-        (state_size,) array
+        (state_size,)
         """
         self.evaluations += 1
         motion, self._inverse = self._evaluate(state)
@@ -146,7 +146,7 @@ class DenseEquation:
 
         Parameters
         ----------
-        state : (state_size,) array
+        state : (state_size,)
 
         Returns
         -------
@@ -166,11 +166,11 @@ class DenseEquation:
 
         Parameters
         ----------
-        state : (state_size,) array
+        state : (state_size,)
 
         Returns
         -------
-        (3·M,) array
+        (3·M,)
         """
         return conserved_quantities(Geometry(self.membranes, state))
 
@@ -181,12 +181,12 @@ class DenseEquation:
         ----------
         motion : Motion
             In that state.
-        adhesion : (2, M·N, state_size) array or None
+        adhesion : (2, M·N, state_size) or None
             Derivative of its force per length by the state; None if there is no adhesion.
 
         Returns
         -------
-        (state_size, state_size) array
+        (state_size, state_size)
         TensionInverse
             In this geometry.
         """
@@ -238,7 +238,7 @@ class DenseEquation:
 
         Returns
         -------
-        (2, M·N, state_size) array
+        (2, M·N, state_size)
         """
         count, points = self.membranes.count, self.membranes.points
         by_state = np.zeros((2, count * points, self.membranes.state_size))

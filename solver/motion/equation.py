@@ -59,14 +59,14 @@ class Motion:
         Points and tangents in this state.
     closeness : Proximity or None
         Which membranes are close to which; None for a single curve.
-    velocity : (2, M, N) array
+    velocity : (2, M, N)
         u at the points.
-    rotation_rate : (M, N) array
+    rotation_rate : (M, N)
         n · u_s, how fast the material turns.
-    tension : (M, N) array
-    bending : (2, M, N) array
+    tension : (M, N)
+    bending : (2, M, N)
         Force per length.
-    adhesion : (2, M, N) array or None
+    adhesion : (2, M, N) or None
         Force per length; None for a scene without adhesion.
     """
 
@@ -159,7 +159,7 @@ class EquationOfMotion(Protocol):
 
         Parameters
         ----------
-        state : (state_size,) array
+        state : (state_size,)
 
         Returns
         -------
@@ -176,11 +176,11 @@ class EquationOfMotion(Protocol):
 
         Parameters
         ----------
-        state : (state_size,) array
+        state : (state_size,)
 
         Returns
         -------
-        (state_size,) array
+        (state_size,)
             See `Motion.rate`.
 
         Raises
@@ -194,7 +194,7 @@ class EquationOfMotion(Protocol):
 
         Parameters
         ----------
-        state : (state_size,) array
+        state : (state_size,)
 
         Returns
         -------
@@ -212,11 +212,11 @@ class EquationOfMotion(Protocol):
 
         Parameters
         ----------
-        state : (state_size,) array
+        state : (state_size,)
 
         Returns
         -------
-        (3·M,) array
+        (3·M,)
             See `conserved_quantities`.
         """
 
@@ -231,7 +231,7 @@ def conserved_quantities(geometry: Geometry) -> Array:
 
     Returns
     -------
-    (3·M,) array
+    (3·M,)
         Reduced areas 4π·area/length², then the mean tangents, x and y.
     """
     reduced_areas = 4 * np.pi * geometry.areas / geometry.membranes.length**2

@@ -26,11 +26,11 @@ class Jacobian(Protocol):
 
         Parameters
         ----------
-        direction : (n,) array
+        direction : (n,)
 
         Returns
         -------
-        (n,) array
+        (n,)
         """
 
     def solver(self, duration: float) -> Callable[[Array], Array]:
@@ -54,7 +54,7 @@ class DenseJacobian:
 
     Attributes
     ----------
-    matrix : (n, n) array
+    matrix : (n, n)
     """
 
     matrix: Array
@@ -64,11 +64,11 @@ class DenseJacobian:
 
         Parameters
         ----------
-        direction : (n,) array
+        direction : (n,)
 
         Returns
         -------
-        (n,) array
+        (n,)
         """
         return np.asarray(self.matrix @ direction)
 
@@ -96,7 +96,7 @@ class BlockDiagonal:
 
     Attributes
     ----------
-    blocks : (m, n, n) array
+    blocks : (m, n, n)
         One dense block for each of the m parts that are this rank's.
     members : (M, n) array of int
         The elements of the state that belong to each of all M parts; every element belongs to one part.
@@ -113,11 +113,11 @@ class BlockDiagonal:
 
         Parameters
         ----------
-        direction : (M·n,) array
+        direction : (M·n,)
 
         Returns
         -------
-        (M·n,) array
+        (M·n,)
         """
         parts = direction[self.members[self.shares.own]]
         result = np.empty_like(direction)

@@ -119,7 +119,7 @@ class SummedEquation:
 
         Parameters
         ----------
-        state : (state_size,) array
+        state : (state_size,)
 
         Returns
         -------
@@ -133,11 +133,11 @@ class SummedEquation:
 
         Parameters
         ----------
-        state : (state_size,) array
+        state : (state_size,)
 
         Returns
         -------
-        (state_size,) array
+        (state_size,)
         """
         self.evaluations += 1
         self._last = self._evaluate(state)
@@ -148,7 +148,7 @@ class SummedEquation:
 
         Parameters
         ----------
-        state : (state_size,) array
+        state : (state_size,)
 
         Returns
         -------
@@ -185,11 +185,11 @@ class SummedEquation:
 
         Parameters
         ----------
-        state : (state_size,) array
+        state : (state_size,)
 
         Returns
         -------
-        (3·M,) array
+        (3·M,)
         """
         return conserved_quantities(Geometry(self.membranes, state))
 

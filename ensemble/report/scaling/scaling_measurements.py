@@ -44,7 +44,7 @@ class EvaluationMeasurement(NamedTuple):
         Collectives in an evaluation, and the bytes that they gather.
     sums : float
         How often an evaluation sums the velocities of all points from all points.
-    rate : (n,) array
+    rate : (n,)
         The result of an evaluation of the initial state.
     """
 

@@ -20,7 +20,7 @@ def position_error(run: Run, membranes: Array) -> tuple[float, float]:
     ----------
     run : Run
         The run.
-    membranes : (vesicles, 2, points) array
+    membranes : (vesicles, 2, points)
         Points of the converged membranes.
 
     Returns

@@ -30,7 +30,7 @@ def final_membranes(run: Run) -> Array:
 
     Returns
     -------
-    (vesicles, 2, points) array
+    (vesicles, 2, points)
         Positions, in the unit of length of the scene.
     """
     lengths = np.array([vesicle.length for vesicle in run.scene.vesicles])
@@ -45,14 +45,14 @@ def shape_distance(points: Array, other: Array) -> Array:
 
     Parameters
     ----------
-    points : (2, N) array
+    points : (2, N)
         The points.
-    other : (2, M) array
+    other : (2, M)
         Points at equal steps of a parameter along a smooth closed curve, M even.
 
     Returns
     -------
-    (N,) array
+    (N,)
         Distances, exact to round-off where the curve is closer than its radius of curvature.
     """
     targets = points[0] + 1j * points[1]

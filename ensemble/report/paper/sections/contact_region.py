@@ -17,11 +17,11 @@ class ContactRegion:
 
     Attributes
     ----------
-    along : (n,) array
+    along : (n,)
         Positions along the contact region, ascending, 0 on the line of centers.
-    gap : (n,) array
+    gap : (n,)
         Twice the distance from the middle between both vesicles.
-    pull : (n,) array
+    pull : (n,)
         Adhesive force per length toward the other vesicle; negative where it repels.
     """
 
