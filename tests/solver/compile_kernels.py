@@ -12,16 +12,17 @@ COUNT = LARGEST_DENSE + 1
 
 
 def scenes_that_use_every_kernel() -> list[Scene]:
-    """Return scenes with few and with many vesicles, of both potentials, with and without a contrast."""
+    """Return scenes of few and of many vesicles, with every formula of adhesion, with and without a contrast."""
     pair = uneven_pair(**fixed_horizon(HORIZON))
     many = suspension(COUNT, **fixed_horizon(HORIZON))
-    cutoff = {"adhesion": PowerLaw(hamaker=1.0, distance=0.4, cutoff=1.2)}
+    adhesions = [
+        PowerLaw(hamaker=1.0, distance=0.4, exponents=exponents, cutoff=cutoff)
+        for exponents in ((4, 2), (5, 3))
+        for cutoff in (None, 1.2)
+    ]
     return [
-        pair,
-        pair.model_copy(update=cutoff),
+        *(scene.model_copy(update={"adhesion": adhesion}) for scene in (pair, many) for adhesion in adhesions),
         with_contrasts(pair, 2.0, 0.5),
-        many,
-        many.model_copy(update=cutoff),
         with_contrasts(many, *[2.0] * COUNT),
     ]
 

@@ -11,14 +11,13 @@ from typing import Any, Literal
 
 import numpy as np
 import pytest
-from numba import typeof
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from solver.analysis.run import Outcome
 from solver.forces.adhesion import DirectAdhesion
 from solver.forces.coarsened_adhesion import CoarsenedAdhesion
-from solver.forces.pair_formulas import PairFormula, formula_and_parameters
+from solver.forces.pair_formulas import formula_and_parameters
 from solver.forces.pair_sums import add_forces, add_stiffnesses, pair_energy
 from solver.membrane.geometry import Geometry, Membranes
 from solver.model import Positive
@@ -131,19 +130,6 @@ def test_compiled_loops_sum_the_same(potential: PairPotential) -> None:
     assert pair_energy(*law, targets, sources, weights) == pytest.approx(value.sum(), rel=1e-12)
     np.testing.assert_allclose(force, expected, rtol=0, atol=1e-12 * np.max(np.abs(expected)))
     np.testing.assert_allclose(stiffness, derivative, rtol=0, atol=1e-12 * np.max(np.abs(derivative)))
-
-
-def test_an_edited_formula_is_compiled_anew() -> None:
-    """Numba's cache on disk tells formulas apart by their code and by the constants they use."""
-
-    def type_of(constant: float, factor: float) -> str:
-        scope: dict[str, Any] = {"__name__": "edited"}
-        source = f"CONSTANT = {constant}\ndef formula(square, parameters):\n"
-        exec(source + f"    return {factor} * CONSTANT * square, 0.0, 0.0\n", scope)
-        return str(typeof(PairFormula(scope["formula"], truncated=False)))
-
-    assert len({type_of(constant, factor) for constant in (1.0, 2.0) for factor in (3.0, 4.0)}) == 4
-    assert type_of(1.0, 3.0) == type_of(1.0, 3.0)
 
 
 # --- A scene with a potential that is not part of the project ---------------------------------------------
