@@ -12,7 +12,7 @@ COUNT = LARGEST_DENSE + 1
 
 
 def scenes_that_use_every_kernel() -> list[Scene]:
-    """Return scenes of few and of many vesicles, with every formula of adhesion, with and without a contrast."""
+    """Return scenes of few and of many vesicles, with every formula of adhesion, and with a contrast."""
     pair = uneven_pair(**fixed_horizon(HORIZON))
     many = suspension(COUNT, **fixed_horizon(HORIZON))
     adhesions = [
@@ -21,7 +21,7 @@ def scenes_that_use_every_kernel() -> list[Scene]:
         for cutoff in (None, 1.2)
     ]
     return [
-        *(scene.model_copy(update={"adhesion": adhesion}) for scene in (pair, many) for adhesion in adhesions),
+        *(scene.model_copy(update={"adhesion": each}) for scene in (pair, many) for each in adhesions),
         with_contrasts(pair, 2.0, 0.5),
         with_contrasts(many, *[2.0] * COUNT),
     ]
