@@ -37,7 +37,8 @@ class Membranes:
         N, on each vesicle.
     length, bending_modulus : (M,)
     circular : (M,) of bool
-        Which vesicles are circles, up to `ROUNDNESS`.
+        Which vesicles are circles, up to `ROUNDNESS`, and have a viscosity contrast.  Without a contrast
+        round-off leaves the tension operator of a circle positive, and nothing is to be projected out.
     multiplicity : int
         1, or 2 with images.
     """
@@ -68,7 +69,7 @@ class Membranes:
             points,
             np.array([vesicle.length for vesicle in vesicles]),
             np.array([vesicle.bending_modulus for vesicle in vesicles]),
-            np.array([vesicle.reduced_area > 1 - ROUNDNESS for vesicle in vesicles]),
+            np.array([v.reduced_area > 1 - ROUNDNESS and v.viscosity_contrast != 1 for v in vesicles]),
             multiplicity,
         )
 

@@ -259,7 +259,8 @@ def test_a_relaxed_start_lies_along_the_diverging_axis() -> None:
     at_rest = simulate(uneven_pair(horizon=30.0))
     assert at_rest.outcome is Outcome.EQUILIBRIUM
     assert energy(run)[0] == pytest.approx(energy(at_rest)[-1], rel=1e-5)
-    assert run.work.rhs_evaluations > at_rest.work.rhs_evaluations
+    # The steps are those after the start; the evaluations include the relaxation.
+    assert run.work.rhs_evaluations > 10 * run.work.steps
 
 
 def test_the_work_limit_is_a_failure_with_its_reason() -> None:
