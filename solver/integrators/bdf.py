@@ -107,7 +107,8 @@ class BackwardDifferentiation:
         bdf = self._bdf
         start, intended, order = bdf.t, bdf.h_abs, bdf.order
         predictor = self._predictor()
-        bdf.step()
+        with np.errstate(invalid="ignore"):  # a state without a rate is NaN, and its step is rejected
+            bdf.step()
         if bdf.status == "failed":
             raise StepFailedError(f"no step size suffices at time {start:g}")
         if not np.all(np.isfinite(bdf.y)):
