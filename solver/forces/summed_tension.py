@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from solver.compilation import compiled
 from solver.forces.tension import Inextensible, TensionNotFoundError
-from solver.membrane.geometry import Geometry
+from solver.membrane.geometry import Geometry, Membranes
 from solver.membrane.spectral import differentiation
 from solver.parallel import Shares
 from solver.potentials.summed_single_layer import SummedSingleLayer
@@ -53,6 +53,33 @@ def _products(shares: Shares, *pairs: tuple[Array, Array]) -> Array:
     """Return the products of fields (m, N), summed over all points of all vesicles.  Collective."""
     sums = [np.einsum("ij,ij->i", first, second) for first, second in pairs]
     return shares.gather(np.stack(sums, axis=1)).sum(axis=0)
+
+
+class _OwnOperator:
+    """The operator A and its preconditioner on the vesicles of this rank."""
+
+    def __init__(self, layer: SummedSingleLayer, geometry: Geometry, preconditioner: Preconditioner) -> None:
+        own, points = layer.shares.own, geometry.membranes.points
+        self._inverses, self._shifts = preconditioner.inverses[own], preconditioner.shifts[own]
+        self._derivative = (2 * np.pi / points) * differentiation(points).T  # spacing · ∂/∂s
+        self.tangents = geometry.tangents[:, own]
+        self.spacing = geometry.membranes.spacing[own, None]
+
+    def pull(self, tension: Array) -> Array:
+        """Return the point forces (2, m, N) of a tension (m, N)."""
+        return np.asarray((tension * self.tangents) @ self._derivative)
+
+    def gradient(self, velocity: Array) -> Array:
+        """Return spacing · ∂u/∂s of a velocity (2, m, N)."""
+        return np.asarray(velocity @ self._derivative)
+
+    def response(self, tension: Array, velocity: Array) -> Array:
+        """Return A σ, if the tension σ alone causes the velocity; otherwise A σ − Div u₀ (m, N)."""
+        return np.asarray(_response(self.tangents, self._shifts, tension, self.gradient(velocity)))
+
+    def precondition(self, residual: Array) -> Array:
+        """Return the correction of the tension for a residual (m, N)."""
+        return np.asarray((self._inverses @ residual[:, :, None])[:, :, 0])
 
 
 class SummedInextensibility:
@@ -107,24 +134,33 @@ class SummedInextensibility:
             If the iteration does not converge.
         """
         membranes, shares = geometry.membranes, layer.shares
+        operator = _OwnOperator(layer, geometry, preconditioner)
         own = shares.own
-        tangents, spacing = geometry.tangents[:, own], membranes.spacing[own, None]
-        inverses, shifts = preconditioner.inverses[own], preconditioner.shifts[own]
-        derivative = (2 * np.pi / membranes.points) * differentiation(membranes.points).T  # spacing · ∂/∂s
-
-        def pull(tension: Array) -> Array:
-            return np.asarray((tension * tangents) @ derivative)
-
-        def precondition(residual: Array) -> Array:
-            return np.asarray((inverses @ residual[:, :, None])[:, :, 0])
-
-        tension = np.zeros(tangents.shape[1:]) if guess is None else guess[own].copy()
-        velocity = layer.velocity(density[:, own] * spacing + pull(tension))
+        tension = np.zeros(operator.tangents.shape[1:]) if guess is None else guess[own].copy()
+        velocity = layer.velocity(density[:, own] * operator.spacing + operator.pull(tension))
         if flow is not None:
             velocity += flow[:, own]
-        gradient = velocity @ derivative
-        residual = -_response(tangents, shifts, tension, gradient)
-        direction = precondition(residual)
+        self._iterate(layer, membranes, operator, tension, velocity)
+        gradient, tangents = operator.gradient(velocity), operator.tangents
+        rotation_rate = (tangents[0] * gradient[1] - tangents[1] * gradient[0]) / operator.spacing
+        velocity_x, velocity_y, rotation_rate, tension = shares.gather(
+            np.stack([*velocity, rotation_rate, tension]), axis=1
+        )
+        return Inextensible(tension, np.stack([velocity_x, velocity_y]), rotation_rate)
+
+    def _iterate(
+        self,
+        layer: SummedSingleLayer,
+        membranes: Membranes,
+        operator: _OwnOperator,
+        tension: Array,
+        velocity: Array,
+    ) -> None:
+        """Change the tension (m, N), and with it the velocity (2, m, N), until nothing stretches."""
+        shares = layer.shares
+        gradient = operator.gradient(velocity)
+        residual = -operator.response(tension, velocity)
+        direction = operator.precondition(residual)
         strain_x, strain_y, square, product = _products(
             shares,
             (gradient[0], gradient[0]),
@@ -136,23 +172,16 @@ class SummedInextensibility:
         goal = self.tolerance**2 * max(strain_x + strain_y, natural)
         for _ in range(_LIMIT):
             if square <= goal:
-                break
+                return
             self.iterations += 1
-            change = layer.velocity(pull(direction))
-            response = _response(tangents, shifts, direction, change @ derivative)
+            change = layer.velocity(operator.pull(direction))
+            response = operator.response(direction, change)
             step = product / _products(shares, (direction, response))[0]
             tension += step * direction
             velocity += step * change
             residual -= step * response
-            correction = precondition(residual)
+            correction = operator.precondition(residual)
             previous = product
             square, product = _products(shares, (residual, residual), (residual, correction))
             direction = correction + (product / previous) * direction
-        else:
-            raise TensionNotFoundError("the tension could not be found: the membranes are too distorted")
-        gradient = velocity @ derivative
-        rotation_rate = (tangents[0] * gradient[1] - tangents[1] * gradient[0]) / spacing
-        velocity_x, velocity_y, rotation_rate, tension = shares.gather(
-            np.stack([*velocity, rotation_rate, tension]), axis=1
-        )
-        return Inextensible(tension, np.stack([velocity_x, velocity_y]), rotation_rate)
+        raise TensionNotFoundError("the tension could not be found: the membranes are too distorted")
