@@ -1,6 +1,6 @@
-"""Questions that the package answers, one kind a module: a study, a single scene.
+"""Questions that the package answers, one module for each kind: a study, a single scene.
 
-The command line and the service know nothing of kinds but what `Question` states.  To add one:
+The command line and the service know of a kind only what `Question` states.  To add a kind:
 
 1. Write the model of its documents as a subclass of `solver.scene.Model`, with a top-level key (the *marker*)
    that no other kind has.
@@ -10,9 +10,10 @@ The command line and the service know nothing of kinds but what `Question` state
 3. Enter the class in `KINDS` below.  Another distribution enters its own under the entry point group
    `ensemble.questions` instead.
 4. Add its command to `ensemble.cli.question_commands`: a signature and one call of `answer_and_print`.
+   Workers of the service pass it a file and the options ``--store``, ``--progress`` and ``--json``.
 5. If the store keeps the answers, and not only the runs, override `stored` and `all_stored`.
-6. Ship a preset in `ensemble/presets/`, and test it.  `tests/scan_kind.py` is a whole kind in 80 lines, which
-   `tests/api/test_added_kind.py` carries through the command line and the service.
+6. Ship a preset in `ensemble/presets/`, and test it.  `tests/scan_kind.py` is a whole kind in 100 lines.
+   `tests/api/test_added_kind.py` carries it through the command line and the service.
 """
 
 from __future__ import annotations
