@@ -150,7 +150,23 @@ class Integrator(Protocol):
         """
 
 
-IntegratorFactory = Callable[[InitialValueProblem, Numerics], Integrator]
+class IntegratorFactory(Protocol):
+    """Makes the integrators of one name."""
+
+    def __call__(self, problem: InitialValueProblem, numerics: Numerics) -> Integrator:
+        """Make the integrator that a scene asks for.
+
+        Parameters
+        ----------
+        problem : InitialValueProblem
+        numerics : Numerics
+            Of the scene.
+
+        Returns
+        -------
+        Integrator
+        """
+
 
 _factories: dict[str, IntegratorFactory] = {}
 

@@ -3,38 +3,31 @@
 The membranes move with the fluid, u = u_∞ + S[f_bending + f_adhesion + f_tension], and do not stretch (Quaife
 et al. 2019, appendix A).  Where the fluid inside a vesicle has another viscosity than that outside, both
 terms of u are changed (`ViscosityContrast`).
-
-`DenseEquation.of` is the one place where a scene becomes the terms that it has.  What a scene does not have
-is never constructed.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.flows import ImposedFlow
 from solver.forces.adhesion import DirectAdhesion
-from solver.forces.bending import Bending, bending_of
-from solver.forces.tension import ROUND_OFF, Inextensibility, TensionInverse
+from solver.forces.bending import Bending
+from solver.forces.tension import Inextensibility, TensionInverse
 from solver.membrane.geometry import Geometry, Membranes
 from solver.membrane.spectral import differentiation, highest_modes, integration
-from solver.membrane.symmetry import independent_vesicles
 from solver.membrane.tangential_velocity import (
     tangential_speed,
     tangential_speed_by_curvature,
     tangential_speed_weights,
 )
-from solver.motion.equation import Motion, accuracy_of, conserved_quantities
+from solver.motion.equation import Motion, conserved_quantities
 from solver.motion.jacobian import DenseJacobian
-from solver.parallel import SERIAL, Parallel
 from solver.potentials.proximity import Closeness
 from solver.potentials.single_layer import SingleLayer
-from solver.potentials.viscosity_contrast import ViscosityContrast, contrasts
-from solver.scene import Scene
+from solver.potentials.viscosity_contrast import ViscosityContrast
 
 Array = NDArray[np.float64]
 
@@ -70,39 +63,6 @@ class DenseEquation:
     recordings: int = field(default=0, init=False)
     _inverse: TensionInverse | None = field(default=None, init=False)
     _assembled: tuple[Geometry, Closeness | None] | None = field(default=None, init=False)
-
-    @classmethod
-    def of(cls, scene: Scene, parallel: Parallel = SERIAL) -> Self:
-        """Make the terms that a scene has.
-
-        Parameters
-        ----------
-        scene : Scene
-            Its number of points is given.
-        parallel : Parallel
-            The ranks that compute the terms together.
-
-        Returns
-        -------
-        DenseEquation
-        """
-        membranes = Membranes.of_scene(scene)
-        adhesion = None
-        several = membranes.curves > 1
-        accuracy = accuracy_of(scene.numerics)
-        contrast = contrasts(independent_vesicles(scene))
-        differ = bool(np.any(contrast != 1))
-        if scene.adhesion and several:
-            adhesion = DirectAdhesion(scene.adhesion, accuracy, membranes, parallel)
-        return cls(
-            membranes=membranes,
-            bending=bending_of(membranes),
-            adhesion=adhesion,
-            flow=scene.flow,
-            inextensibility=Inextensibility(accuracy, 1e-3 * accuracy if several else ROUND_OFF),
-            layer=SingleLayer(membranes, accuracy, parallel),
-            contrast=ViscosityContrast(contrast, membranes, accuracy) if differ else None,
-        )
 
     @property
     def tension_iterations(self) -> int:

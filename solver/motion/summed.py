@@ -3,26 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from typing import NamedTuple, Self
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.flows import ImposedFlow
 from solver.forces.adhesion import DirectAdhesion
-from solver.forces.bending import Bending, bending_of
-from solver.forces.coarsened_adhesion import CoarsenedAdhesion, adhesion_of_many
+from solver.forces.bending import Bending
+from solver.forces.coarsened_adhesion import CoarsenedAdhesion
 from solver.forces.summed_tension import Preconditioner, SummedInextensibility
-from solver.forces.tension import Inextensibility, TensionInverse, TensionNotFoundError
+from solver.forces.tension import TensionInverse, TensionNotFoundError
 from solver.membrane.geometry import Geometry, Membranes
 from solver.motion.dense import DenseEquation
-from solver.motion.equation import Motion, accuracy_of, conserved_quantities
+from solver.motion.equation import Motion, conserved_quantities
 from solver.motion.jacobian import BlockDiagonal
 from solver.parallel import Parallel, Shares
 from solver.potentials.neighbors import Neighbors
 from solver.potentials.summed_single_layer import SummedSingleLayer
-from solver.scene import Scene
 
 Array = NDArray[np.float64]
 
@@ -43,7 +42,6 @@ class SummedEquation:
 
     Attributes
     ----------
-    scene : Scene
     parallel : Parallel
         The ranks that compute the terms together.
     membranes : Membranes
@@ -54,13 +52,14 @@ class SummedEquation:
         None in a quiescent fluid.
     inextensibility : SummedInextensibility
     layer : SummedSingleLayer
+    isolated : callable
+        From the number of a vesicle to its `DenseEquation` as if it were alone in the flow.
     contrast : None
         Sums know no other viscosity inside the vesicles.
     evaluations, recordings : int
         See `EquationOfMotion`.
     """
 
-    scene: Scene
     parallel: Parallel
     membranes: Membranes
     bending: Bending
@@ -68,41 +67,11 @@ class SummedEquation:
     flow: ImposedFlow | None
     inextensibility: SummedInextensibility
     layer: SummedSingleLayer
+    isolated: Callable[[int], DenseEquation]
     contrast: None = field(default=None, init=False)
     evaluations: int = field(default=0, init=False)
     recordings: int = field(default=0, init=False)
     _last: _Evaluation | None = field(default=None, init=False)
-
-    @classmethod
-    def of(cls, scene: Scene, parallel: Parallel) -> Self:
-        """Make the terms that a scene has.
-
-        Parameters
-        ----------
-        scene : Scene
-            Its number of points is given.
-        parallel : Parallel
-            The ranks that compute the terms together.
-
-        Returns
-        -------
-        SummedEquation
-        """
-        membranes = Membranes.of_scene(scene)
-        accuracy = accuracy_of(scene.numerics)
-        adhesion = None
-        if scene.adhesion:
-            adhesion = adhesion_of_many(scene.adhesion, accuracy, membranes, parallel)
-        return cls(
-            scene=scene,
-            parallel=parallel,
-            membranes=membranes,
-            bending=bending_of(membranes),
-            adhesion=adhesion,
-            flow=scene.flow,
-            inextensibility=SummedInextensibility(accuracy),
-            layer=SummedSingleLayer(membranes, accuracy, parallel),
-        )
 
     @property
     def reach(self) -> float:
@@ -232,7 +201,9 @@ class SummedEquation:
         inverses, shifts = np.empty((len(mine), points, points)), np.empty(len(mine))
         failed = np.zeros(len(mine))
         for k, vesicle in enumerate(mine):
-            isolated, its_geometry = self._isolated(geometry, vesicle)
+            isolated = self.isolated(vesicle)
+            state = np.concatenate([geometry.tangent_angle[vesicle], geometry.centers[:, vesicle]])
+            its_geometry = Geometry(isolated.membranes, state)
             try:
                 inverses[k], shifts[k : k + 1] = invert(isolated, its_geometry, vesicle)
             except TensionNotFoundError:
@@ -241,15 +212,6 @@ class SummedEquation:
             vesicle = int(np.argmax(everywhere))
             raise TensionNotFoundError(f"the tension could not be found: vesicle {vesicle} is too distorted")
         return Preconditioner(shares.gather(inverses), shares.gather(shifts)[:, None])
-
-    def _isolated(self, geometry: Geometry, vesicle: int) -> tuple[DenseEquation, Geometry]:
-        """Return a vesicle as if it were alone in the flow, and its geometry."""
-        scene = self.scene.model_copy(update={"vesicles": (self.scene.vesicles[vesicle],), "adhesion": None})
-        accuracy = accuracy_of(scene.numerics)
-        inextensibility = Inextensibility(accuracy, 1e-3 * accuracy)
-        isolated = replace(DenseEquation.of(scene), inextensibility=inextensibility)
-        state = np.concatenate([geometry.tangent_angle[vesicle], geometry.centers[:, vesicle]])
-        return isolated, Geometry(isolated.membranes, state)
 
 
 def _tension_inverse(isolated: DenseEquation, geometry: Geometry, _: int) -> TensionInverse:

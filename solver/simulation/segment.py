@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from solver.integrators import InitialValueProblem, Integrator, Step, integrator_for
 from solver.membrane.geometry import Membranes
-from solver.motion.form import equation_of_motion
-from solver.parallel import Parallel
+from solver.motion.equation import EquationOfMotion
 from solver.scene import Scene
 
 Array = NDArray[np.float64]
@@ -40,20 +39,15 @@ class Segment:
 
     Parameters
     ----------
-    scene : Scene
+    equation : EquationOfMotion
         With that number of points.
+    scene : Scene
     before : SegmentWork
         Of the parts before this one.
-    parallel : Parallel
-        The ranks that compute it together.
-
-    Attributes
-    ----------
-    equation : EquationOfMotion
     """
 
-    def __init__(self, scene: Scene, before: SegmentWork, parallel: Parallel) -> None:
-        self.equation = equation_of_motion(scene, parallel)
+    def __init__(self, equation: EquationOfMotion, scene: Scene, before: SegmentWork) -> None:
+        self.equation = equation
         self._scene = scene
         self._before = before
         self._integrator: Integrator | None = None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +15,9 @@ from solver.analysis.run import LARGEST_SPATIAL, Energy, Errors, Outcome, Run, W
 from solver.forces.tension import TensionNotFoundError
 from solver.integrators import StepFailedError
 from solver.membrane.geometry import Membranes
+from solver.motion.terms import equation_of_motion
 from solver.parallel import SERIAL, Parallel, first_rank_asks
-from solver.scene import Output, Scene, Start
+from solver.scene import Scene
 from solver.simulation.blas_threads import one_blas_thread
 from solver.simulation.initial_state import initial_ellipses, rotated_state
 from solver.simulation.resolution import UnresolvedError, resolution_of, with_points
@@ -24,7 +26,7 @@ from solver.simulation.time_loop import TimeLoop
 Array = NDArray[np.float64]
 
 # While a start relaxes, whatever the scene records: when the relaxation ends depends on when it is sampled.
-_RELAXATION_OUTPUT = Output(interval=2.0, frame_interval=10.0)
+_RELAXATION_OUTPUT = {"interval": 2.0, "frame_interval": 10.0}
 
 _NUMERICAL_FAILURES = (StepFailedError, UnresolvedError, TensionNotFoundError, np.linalg.LinAlgError)
 
@@ -70,7 +72,8 @@ def simulate(
         resolution = resolution_of(scene)
         start = _start(scene, resolution.points, parallel, should_stop)
         should_stop = first_rank_asks(parallel, should_stop)
-        loop = TimeLoop(scene, start.points, start.state, resolution, parallel)
+        equation_of = partial(equation_of_motion, parallel=parallel)
+        loop = TimeLoop(scene, start.points, start.state, resolution, equation_of, parallel)
         failure = None
         try:
             loop.recorder.record(loop.time, loop.state)
@@ -108,9 +111,9 @@ def _start(scene: Scene, points: int, parallel: Parallel, should_stop: Callable[
     at_rest = scene.model_copy(
         update={
             "flow": None,
-            "start": Start(),
+            "start": scene.start.model_copy(update={"relaxed": False}),
             "horizon": scene.start.horizon,
-            "output": _RELAXATION_OUTPUT,
+            "output": scene.output.model_copy(update=_RELAXATION_OUTPUT),
         }
     )
     relaxed = simulate(at_rest, parallel=parallel, should_stop=should_stop)

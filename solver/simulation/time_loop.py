@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +14,7 @@ from solver.analysis.revolutions import LongAxisTracker, RevolutionTracker, may_
 from solver.analysis.run import Outcome
 from solver.integrators import Step, StepFailedError
 from solver.membrane.resampling import resampled_state
+from solver.motion.equation import EquationOfMotion
 from solver.parallel import Parallel, require_agreement
 from solver.scene import Scene
 from solver.simulation.resolution import Resolution, with_points
@@ -32,6 +35,8 @@ class TimeLoop:
         At time 0, with these points.
     resolution : Resolution
         Asks for more points.
+    equation_of : callable
+        From a scene whose number of points is given to its `EquationOfMotion`.
     parallel : Parallel
         The ranks that compute the run together.
 
@@ -55,16 +60,23 @@ class TimeLoop:
     """
 
     def __init__(
-        self, scene: Scene, points: int, state: Array, resolution: Resolution, parallel: Parallel
+        self,
+        scene: Scene,
+        points: int,
+        state: Array,
+        resolution: Resolution,
+        equation_of: Callable[[Scene], EquationOfMotion],
+        parallel: Parallel,
     ) -> None:
         self._scene = scene
         self._resolution = resolution
+        self._equation_of = equation_of
         self._parallel = parallel
         self._criteria = criteria_for(scene)
         self.time = 0.0
         self.state = state
         self.outcome = Outcome.UNDECIDED
-        self.segment = Segment(with_points(scene, points), SegmentWork(), parallel)
+        self.segment = Segment(equation_of(with_points(scene, points)), scene, SegmentWork())
         membranes = self.segment.membranes
         self._line_of_centers = (
             LineOfCenters(membranes, state, scene.criteria.separated_distance)
@@ -119,7 +131,8 @@ class TimeLoop:
     def _refine(self, points: int) -> None:
         """Go on from the start of the step with more points."""
         coarse = self.segment.membranes
-        self.segment = Segment(with_points(self._scene, points), self.segment.work, self._parallel)
+        equation = self._equation_of(with_points(self._scene, points))
+        self.segment = Segment(equation, self._scene, self.segment.work)
         self.state = resampled_state(coarse, self.state, self.segment.membranes)
         self.rejected_steps += 1
         self.recorder.continue_with(self.segment.equation)

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from ensemble.config.documents import load_scene
-from solver.motion.dense import DenseEquation
+from solver.motion.terms import dense_equation
 from solver.potentials.direct_sum import velocity
 from solver.simulation.simulate import simulate
 
@@ -130,7 +130,7 @@ def evaluation(points: int) -> dict[str, float]:
     """
     scene = load_scene("doublet-shear", [f"numerics.points={points}", "horizon=20"])
     frames = simulate(scene).frames
-    dynamics = DenseEquation.of(scene)
+    dynamics = dense_equation(scene)
     membranes = dynamics.membranes
     earlier, state = (
         membranes.pack(frames.tangent_angle[k, : membranes.count], frames.center[k, : membranes.count])

@@ -22,7 +22,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from ensemble.mpi.ranks import Ranks
-from solver.motion.form import equation_of_motion
+from solver.motion.terms import equation_of_motion
 from solver.parallel import SERIAL, Parallel
 from solver.scene import Scene
 from solver.simulation.initial_state import initial_ellipses

@@ -17,6 +17,7 @@ from solver.integrators.integrator import DifferentialEquation
 from solver.integrators.one_step import OneStepIntegrator, OneStepMethod
 from solver.motion.dense import DenseEquation
 from solver.motion.jacobian import DenseJacobian
+from solver.motion.terms import dense_equation
 from solver.scene import Numerics
 from solver.simulation.initial_state import initial_ellipses
 from tests.solver.scenes import shear_pair
@@ -110,7 +111,7 @@ def oscillator_errors(
 def sheared_pair(begin: float) -> tuple[DenseEquation, Array, float]:
     """Adhering vesicles that have been in shear for some time, and the rate of their fastest mode."""
     scene = shear_pair(1.5, numerics=Numerics(points=32, tolerance=1e-9))
-    dynamics = DenseEquation.of(scene)
+    dynamics = dense_equation(scene)
     problem = InitialValueProblem(dynamics, initial_ellipses(scene), 0.0, begin)
     state = all_steps(BackwardDifferentiation(problem, 1e-8), begin)[-1].state
     return dynamics, state, float(-np.linalg.eigvals(dynamics.jacobian(state).matrix).real.min())

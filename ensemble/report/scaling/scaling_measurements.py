@@ -15,7 +15,7 @@ from ensemble.report.scaling.counting_ranks import CountingRanks
 from ensemble.report.scaling.scaling_document import CollectiveTime
 from ensemble.report.scaling.scaling_plan import suspension
 from ensemble.report.scaling.time_shares import time_shares
-from solver.motion.form import equation_of_motion
+from solver.motion.terms import equation_of_motion
 from solver.parallel import SERIAL, Array
 from solver.potentials.direct_sum import velocity
 from solver.simulation.initial_state import initial_ellipses

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from ensemble.mpi.ranks import Ranks
 from ensemble.mpi.world import abort_guard, world
 from solver.analysis.run import Run
-from solver.motion.dense import DenseEquation
-from solver.motion.summed import SummedEquation
+from solver.motion.terms import dense_equation, summed_equation
 from solver.parallel import SERIAL, Parallel
 from solver.scene import LARGEST_DENSE, Numerics, PowerLaw, Scene, Shear, Trap, Vesicle
 from solver.simulation.initial_state import initial_ellipses
@@ -39,13 +38,13 @@ DOUBLET = shear_pair(3.5, numerics=Numerics(points=32, tolerance=1e-3))
 
 def linearized(scene: Scene, parallel: Parallel) -> tuple[Array, Array]:
     """Right-hand side and Jacobian where a scene begins."""
-    dynamics, state = DenseEquation.of(scene, parallel), initial_ellipses(scene)
+    dynamics, state = dense_equation(scene, parallel), initial_ellipses(scene)
     return dynamics.rate(state), dynamics.jacobian(state).matrix
 
 
 def summed(scene: Scene, parallel: Parallel) -> tuple[Array, Array]:
     """Right-hand side and energy of adhesion of many vesicles where a scene begins."""
-    sums = SummedEquation.of(scene, parallel)
+    sums = summed_equation(scene, parallel)
     motion = sums.motion(initial_ellipses(scene))
     assert sums.adhesion
     assert motion.closeness

@@ -106,7 +106,7 @@ with abort_guard(communicator):
 DISTORTED = """
 import numpy as np
 from ensemble.mpi.world import abort_guard, world
-from solver.motion.form import equation_of_motion
+from solver.motion.terms import equation_of_motion
 from ensemble.mpi.ranks import Ranks
 from solver.simulation.initial_state import initial_ellipses
 from solver.forces.tension import TensionNotFoundError

@@ -16,7 +16,7 @@ from solver.flows import FLOWS, ImposedFlow, Symbol
 from solver.membrane.geometry import Membranes
 from solver.membrane.symmetry import has_images
 from solver.model import Positive
-from solver.motion.dense import DenseEquation
+from solver.motion.terms import dense_equation
 from solver.scene import Numerics, Scene
 from solver.simulation.initial_state import initial_ellipses
 from solver.simulation.simulate import simulate
@@ -86,7 +86,7 @@ def test_a_pair_that_a_half_turn_leaves_as_it_is_moves_along() -> None:
 def test_the_equation_of_motion_has_its_exact_jacobian() -> None:
     """Against fourth-order differences of the rate, along a smooth change of state."""
     scene = uneven_pair(flow=Poiseuille(rate=0.4), numerics=Numerics(points=96, tolerance=1e-9))
-    equation, state, step = DenseEquation.of(scene), initial_ellipses(scene), 1e-3
+    equation, state, step = dense_equation(scene), initial_ellipses(scene), 1e-3
     direction = smooth_direction(equation.membranes)
     rates = [equation.rate(state + k * step * direction) for k in (-2, -1, 1, 2)]
     exact = np.array([1, -8, 8, -1]) @ np.array(rates) / (12 * step)

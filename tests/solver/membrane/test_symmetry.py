@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from solver.membrane.symmetry import has_images, independent_vesicles
-from solver.motion.dense import DenseEquation
+from solver.motion.terms import dense_equation
 from solver.scene import Criteria, Extension, Numerics, PowerLaw, Scene, Shear, Start, Trap, Vesicle
 from solver.simulation.initial_state import initial_ellipses
 from solver.simulation.simulate import simulate
@@ -75,7 +75,7 @@ def test_the_rate_is_that_of_the_pair(flow: Shear | Extension | Trap | None) -> 
     half, whole = tilted(flow), tilted(flow, offset=1e-12)
     rates = []
     for scene in (half, whole):
-        dynamics = DenseEquation.of(scene)
+        dynamics = dense_equation(scene)
         rate = dynamics.rate(initial_ellipses(scene))
         rates.append((dynamics.membranes.tangent_angle(rate)[0], dynamics.membranes.center(rate)[0]))
     for mine, theirs in zip(*rates, strict=True):
@@ -111,7 +111,7 @@ def test_a_relaxed_start_is_turned_with_its_image() -> None:
 @pytest.mark.parametrize("flow", FLOWS, ids=lambda flow: flow.kind if flow else "rest")
 def test_the_jacobian_follows_the_image(flow: Shear | Extension | Trap | None) -> None:
     scene = shear_pair(1.5, numerics={"points": 96, "tolerance": 1e-9}).model_copy(update={"flow": flow})
-    dynamics, state = DenseEquation.of(scene), initial_ellipses(scene)
+    dynamics, state = dense_equation(scene), initial_ellipses(scene)
     assert state.size == 98
     direction, size = smooth_direction(dynamics.membranes), 1e-4
     difference = (dynamics.rate(state + size * direction) - dynamics.rate(state - size * direction)) / (

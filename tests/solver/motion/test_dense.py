@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from solver.forces import adhesion as adhesion_module
 from solver.membrane.geometry import Geometry
-from solver.motion import dense as dynamics_module
-from solver.motion.dense import DenseEquation
+from solver.motion import dense as dense_module
+from solver.motion import terms as terms_module
+from solver.motion.terms import dense_equation
 from solver.potentials import viscosity_contrast as contrast_module
 from solver.potentials.proximity import Closeness
 from solver.potentials.single_layer import SingleLayer
@@ -29,7 +30,7 @@ FLOWS = [None, Shear(rate=0.8), Extension(rate=0.3), Trap(rate=0.3)]
 def test_the_jacobian_is_exact(flow: Any) -> None:
     """Against fourth-order differences of the rate, along smooth changes of state."""
     scene = uneven_pair(flow=flow, numerics=Numerics(points=96, tolerance=1e-9))
-    dynamics, state, step = DenseEquation.of(scene), initial_ellipses(scene), 1e-3
+    dynamics, state, step = dense_equation(scene), initial_ellipses(scene), 1e-3
     membranes = dynamics.membranes
     state += 0.2 * smooth_direction(membranes, seed=5)
     jacobian = dynamics.jacobian(state)
@@ -42,7 +43,7 @@ def test_the_jacobian_is_exact(flow: Any) -> None:
 
 
 def transformed(scene: Scene, state: Array, angle: float, shift: Array) -> Array:
-    membranes = DenseEquation.of(scene).membranes
+    membranes = dense_equation(scene).membranes
     c, s = np.cos(angle), np.sin(angle)
     center = membranes.center(state) @ np.array([[c, s], [-s, c]]) + shift
     return membranes.pack(membranes.tangent_angle(state) + angle, center)
@@ -52,8 +53,8 @@ def test_the_rate_of_a_turned_and_shifted_state_is_the_turned_rate() -> None:
     scene = uneven_pair(numerics=TIGHT)
     state = initial_ellipses(scene)
     there = transformed(scene, state, 0.9, np.array([5.0, -3.0]))
-    membranes = DenseEquation.of(scene).membranes
-    rate, turned = DenseEquation.of(scene).rate(state), DenseEquation.of(scene).rate(there)
+    membranes = dense_equation(scene).membranes
+    rate, turned = dense_equation(scene).rate(state), dense_equation(scene).rate(there)
     scale = np.max(np.abs(rate))
     np.testing.assert_allclose(
         membranes.tangent_angle(turned), membranes.tangent_angle(rate), rtol=0, atol=1e-10 * scale
@@ -67,7 +68,7 @@ def test_the_rate_of_a_turned_and_shifted_state_is_the_turned_rate() -> None:
 @pytest.mark.parametrize("flow", FLOWS, ids=lambda flow: flow.kind if flow else "rest")
 def test_membranes_do_not_stretch_and_fluid_does_not_vanish(flow: Any) -> None:
     scene = uneven_pair(flow=flow, numerics=Numerics(points=128, tolerance=1e-9))
-    motion = DenseEquation.of(scene).motion(initial_ellipses(scene))
+    motion = dense_equation(scene).motion(initial_ellipses(scene))
     geometry = motion.geometry
     gradient = geometry.arclength_derivative(motion.velocity)
     scale = np.max(np.abs(gradient))
@@ -79,7 +80,7 @@ def test_membranes_do_not_stretch_and_fluid_does_not_vanish(flow: Any) -> None:
 def test_forces_feed_what_the_fluid_dissipates() -> None:
     """At rest −dE/dt, by differences along the motion, is the work of all forces on the fluid."""
     scene = uneven_pair(numerics=Numerics(points=128, tolerance=1e-9))
-    dynamics, state, step = DenseEquation.of(scene), initial_ellipses(scene), 1e-4
+    dynamics, state, step = dense_equation(scene), initial_ellipses(scene), 1e-4
     assert dynamics.adhesion
     rate = dynamics.rate(state)
     energy = []
@@ -98,10 +99,10 @@ def test_forces_feed_what_the_fluid_dissipates() -> None:
 
 
 TERMS = [
-    (dynamics_module, "DirectAdhesion"),
-    (dynamics_module, "Closeness"),
+    (terms_module, "DirectAdhesion"),
+    (dense_module, "Closeness"),
     (adhesion_module, "WithinCutoff"),
-    (dynamics_module, "ViscosityContrast"),
+    (terms_module, "ViscosityContrast"),
     (contrast_module, "DoubleLayer"),
 ]
 
@@ -150,7 +151,7 @@ def test_terms_that_a_scene_lacks_are_never_constructed(
     constructed: Counter[str], fields: dict[str, Any], expected: set[str]
 ) -> None:
     scene = Scene(horizon=1.0, **fields)
-    dynamics = DenseEquation.of(scene)
+    dynamics = dense_equation(scene)
     state = initial_ellipses(scene)
     dynamics.rate(state)
     dynamics.jacobian(state)
@@ -159,7 +160,7 @@ def test_terms_that_a_scene_lacks_are_never_constructed(
 
 def test_the_terms_are_constructed_once_a_simulation(constructed: Counter[str]) -> None:
     scene = uneven_pair(flow=Trap(rate=0.1))
-    dynamics = DenseEquation.of(scene)
+    dynamics = dense_equation(scene)
     for _ in range(3):
         dynamics.rate(initial_ellipses(scene))
     assert constructed["DirectAdhesion"] == 1
@@ -176,7 +177,7 @@ def test_vesicles_far_apart_are_not_interpolated(monkeypatch: pytest.MonkeyPatch
 
     monkeypatch.setattr(SingleLayer, "assemble", spied)
     scene = Scene(horizon=1.0, vesicles=(Vesicle(center=(-4.0, 0.0)), Vesicle(center=(4.0, 0.0))))
-    DenseEquation.of(scene).rate(initial_ellipses(scene))
+    dense_equation(scene).rate(initial_ellipses(scene))
     assert calls == [(0, 64)]
 
 
@@ -192,6 +193,6 @@ def test_vesicles_far_apart_are_not_interpolated(monkeypatch: pytest.MonkeyPatch
 def test_a_term_of_zero_strength_changes_round_off_only(zero: dict[str, Any]) -> None:
     without = uneven_pair(adhesion=None, numerics=TIGHT)
     state = initial_ellipses(without)
-    expected = DenseEquation.of(without).rate(state)
-    rate = DenseEquation.of(without.model_copy(update=zero)).rate(state)
+    expected = dense_equation(without).rate(state)
+    rate = dense_equation(without.model_copy(update=zero)).rate(state)
     np.testing.assert_allclose(rate, expected, rtol=0, atol=1e-13 * np.max(np.abs(expected)))

@@ -9,9 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from solver.flows import Shear
-from solver.motion.dense import DenseEquation
 from solver.motion.equation import EquationOfMotion
-from solver.motion.summed import SummedEquation
+from solver.motion.terms import dense_equation, summed_equation
 from solver.parallel import SERIAL
 from solver.scene import Numerics, Scene
 from solver.simulation.initial_state import initial_ellipses
@@ -26,14 +25,14 @@ CONTRASTS = with_contrasts(PAIR, 3.0, 0.5).model_copy(update={"numerics": Numeri
 
 
 def summed(scene: Scene) -> EquationOfMotion:
-    return SummedEquation.of(scene, SERIAL)
+    return summed_equation(scene, SERIAL)
 
 
 every_form = pytest.mark.parametrize(
     ("form", "scene", "far"),
     [
-        (DenseEquation.of, PAIR, 3.0),
-        (DenseEquation.of, CONTRASTS, 1.5),
+        (dense_equation, PAIR, 3.0),
+        (dense_equation, CONTRASTS, 1.5),
         (summed, suspension(8), 1.0),
     ],
     ids=["dense", "contrast", "summed"],

@@ -17,8 +17,8 @@ from solver.integrators.bdf import BackwardDifferentiation
 from solver.integrators.sdc import DeferredCorrection
 from solver.membrane.geometry import Geometry, Membranes
 from solver.motion.dense import DenseEquation
-from solver.motion.form import equation_of_motion
 from solver.motion.summed import SummedEquation
+from solver.motion.terms import dense_equation, equation_of_motion, summed_equation
 from solver.parallel import SERIAL
 from solver.potentials import multipoles
 from solver.potentials.direct_sum import velocity as direct_velocity
@@ -62,7 +62,7 @@ def close_together(points: int, **fields: Any) -> Scene:
 def test_sums_and_matrices_give_the_same_motion(fields: dict[str, Any]) -> None:
     scene = close_together(64, **fields)
     state = initial_ellipses(scene)
-    matrices, sums = DenseEquation.of(scene), SummedEquation.of(scene, SERIAL)
+    matrices, sums = dense_equation(scene), summed_equation(scene, SERIAL)
     expected, found = matrices.motion(state), sums.motion(state)
     assert found.closeness
     assert expected.closeness
@@ -86,7 +86,7 @@ def test_the_velocity_converges_spectrally_with_the_points() -> None:
 
     def centers(points: int) -> Array:
         scene = close_together(points, flow=Shear(rate=0.8))
-        return SummedEquation.of(scene, SERIAL).rate(initial_ellipses(scene))[-10:]
+        return summed_equation(scene, SERIAL).rate(initial_ellipses(scene))[-10:]
 
     exact = centers(256)
     errors = [np.max(np.abs(centers(points) - exact)) for points in (32, 64, 128)]
@@ -97,7 +97,7 @@ def test_the_velocity_converges_spectrally_with_the_points() -> None:
 
 def test_membranes_do_not_stretch() -> None:
     scene = suspension(8, 64, 1e-6)
-    sums = SummedEquation.of(scene, SERIAL)
+    sums = summed_equation(scene, SERIAL)
     motion = sums.motion(initial_ellipses(scene))
     gradient = motion.geometry.arclength_derivative(motion.velocity)
     stretching = np.sum(motion.geometry.tangents * gradient, axis=0)
@@ -106,12 +106,12 @@ def test_membranes_do_not_stretch() -> None:
 
 def test_the_last_tension_is_where_the_iteration_begins() -> None:
     scene = suspension(8)
-    sums, state = SummedEquation.of(scene, SERIAL), initial_ellipses(scene)
+    sums, state = summed_equation(scene, SERIAL), initial_ellipses(scene)
     sums.rate(state)
     first = sums.inextensibility.iterations
     rate = sums.rate(state)
     assert sums.inextensibility.iterations <= first + 1
-    fresh = SummedEquation.of(scene, SERIAL).rate(state)
+    fresh = summed_equation(scene, SERIAL).rate(state)
     left_over = 10 * sums.inextensibility.tolerance * np.max(np.abs(fresh))
     np.testing.assert_allclose(rate, fresh, rtol=0, atol=left_over)
 
@@ -122,7 +122,7 @@ def test_blocks_of_the_jacobian_are_those_of_vesicles_far_from_the_others() -> N
     )
     scene = Scene(horizon=1.0, vesicles=vesicles, flow=Shear(rate=0.5))
     state = initial_ellipses(scene)
-    exact, found = DenseEquation.of(scene).jacobian(state), SummedEquation.of(scene, SERIAL).jacobian(state)
+    exact, found = dense_equation(scene).jacobian(state), summed_equation(scene, SERIAL).jacobian(state)
     for members, block in zip(found.members, found.blocks, strict=True):
         expected = exact.matrix[np.ix_(members, members)]
         np.testing.assert_allclose(block, expected, rtol=0, atol=2e-4 * np.max(np.abs(expected)))
@@ -135,7 +135,7 @@ def test_blocks_of_the_jacobian_are_those_of_vesicles_far_from_the_others() -> N
 def test_blocks_contain_how_others_draw_a_vesicle(cutoff: float | None) -> None:
     """Against differences of the adhesion force while one vesicle is shifted."""
     scene = suspension(4, 64, 1e-9, adhesion=PowerLaw(hamaker=1.0, distance=0.4, cutoff=cutoff))
-    sums, state, step = SummedEquation.of(scene, SERIAL), initial_ellipses(scene), 1e-5
+    sums, state, step = summed_equation(scene, SERIAL), initial_ellipses(scene), 1e-5
     assert sums.adhesion
     membranes = sums.membranes
 
@@ -202,7 +202,7 @@ def test_adhesion_between_far_vesicles_needs_few_of_their_points(
 
 def test_neighbors_are_those_found_among_all_pairs() -> None:
     scene = close_together(64)
-    geometry = Geometry(DenseEquation.of(scene).membranes, initial_ellipses(scene))
+    geometry = Geometry(dense_equation(scene).membranes, initial_ellipses(scene))
     everyone, near = Closeness(geometry), Neighbors(geometry, 6.0)
     expected = np.where(everyone.distances <= 6.0, everyone.distances, np.inf)
     found = np.full_like(expected, np.inf)
@@ -218,7 +218,7 @@ def test_the_gap_is_found_however_far_apart_vesicles_are(apart: float) -> None:
         for x, y in ((0.0, 0.0), (2 + apart, 0.0), (0.0, 3 + apart))
     )
     scene = Scene(horizon=1.0, vesicles=circles)
-    assert gap(Geometry(DenseEquation.of(scene).membranes, initial_ellipses(scene))) == pytest.approx(
+    assert gap(Geometry(dense_equation(scene).membranes, initial_ellipses(scene))) == pytest.approx(
         apart, rel=1e-3
     )
 
@@ -229,13 +229,13 @@ def test_the_gap_is_found_however_far_apart_vesicles_are(apart: float) -> None:
 def test_steps_with_blocks_converge_to_those_with_the_whole_jacobian() -> None:
     scene = suspension(4, 32, 1e-7)
     state = initial_ellipses(scene)
-    whole = DenseEquation.of(scene)
+    whole = dense_equation(scene)
     exact = all_steps(BackwardDifferentiation(InitialValueProblem(whole, state, 0.0, 0.5), 1e-8), 0.5)[
         -1
     ].state
     errors = []
     for tolerance in (1e-3, 1e-5):
-        sums = SummedEquation.of(scene, SERIAL)
+        sums = summed_equation(scene, SERIAL)
         problem = InitialValueProblem(sums, state, 0.0, 0.5)
         steps = all_steps(BackwardDifferentiation(problem, tolerance), 0.5)
         errors.append(np.max(np.abs(steps[-1].state - exact)))
@@ -245,7 +245,7 @@ def test_steps_with_blocks_converge_to_those_with_the_whole_jacobian() -> None:
 
 def test_deferred_correction_keeps_its_order_with_blocks() -> None:
     scene = suspension(4, 16, 1e-9, adhesion=None)
-    sums = SummedEquation.of(scene, SERIAL)
+    sums = summed_equation(scene, SERIAL)
     problem = InitialValueProblem(sums, initial_ellipses(scene), 0.0, 0.5)
     state = all_steps(BackwardDifferentiation(problem, 1e-4), 0.5)[-1].state
 
@@ -287,7 +287,7 @@ def test_terms_that_a_scene_lacks_are_never_constructed(monkeypatch: pytest.Monk
     monkeypatch.setattr(coarsened_adhesion, "CoarsenedAdhesion", refuse)
     monkeypatch.setattr(coarsened_adhesion, "DirectAdhesion", refuse)
     scene = suspension(LARGEST_DENSE + 1, adhesion=None, flow=None)
-    sums = SummedEquation.of(scene, SERIAL)
+    sums = summed_equation(scene, SERIAL)
     sums.rate(initial_ellipses(scene))
     sums.jacobian(initial_ellipses(scene))
 
@@ -303,7 +303,7 @@ def test_the_adhesion_that_a_cutoff_needs_is_the_only_one_constructed(
 
     monkeypatch.setattr(coarsened_adhesion, needless, refuse)
     adhesion = PowerLaw(hamaker=1.0, distance=0.4, cutoff=cutoff)
-    assert SummedEquation.of(suspension(LARGEST_DENSE + 1, adhesion=adhesion), SERIAL).adhesion
+    assert summed_equation(suspension(LARGEST_DENSE + 1, adhesion=adhesion), SERIAL).adhesion
 
 
 def test_beyond_the_cutoff_many_vesicles_feel_nothing() -> None:

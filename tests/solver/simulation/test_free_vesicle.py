@@ -17,7 +17,7 @@ from scipy.optimize import root
 from solver.analysis.run import Outcome
 from solver.integrators import InitialValueProblem, integrator_for
 from solver.membrane.shapes import ellipse_tangent_angle, of_reduced_area
-from solver.motion.dense import DenseEquation
+from solver.motion.terms import dense_equation
 from solver.scene import Criteria, Numerics, Scene, Vesicle
 from solver.simulation.simulate import simulate
 
@@ -100,7 +100,7 @@ def test_a_slender_vesicle_relaxes_to_the_euler_lagrange_shape(reduced_area: flo
         vesicles=(Vesicle(reduced_area=reduced_area),),
         numerics=Numerics(points=points, tolerance=1e-8),
     )
-    equation = DenseEquation.of(scene)
+    equation = dense_equation(scene)
     blunt = of_reduced_area(ellipse_tangent_angle(0.55, 2 * np.pi, 0.0, points), reduced_area)
     state = equation.membranes.pack(blunt[None], np.zeros((1, 2)))
     problem = InitialValueProblem(equation, state, 0.0, scene.horizon)

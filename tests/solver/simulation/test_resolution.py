@@ -15,7 +15,9 @@ from solver import Outcome, Run, Scene
 from solver.analysis.run import Frames
 from solver.membrane.curve import positions
 from solver.membrane.geometry import Membranes
+from solver.motion import terms
 from solver.motion.dense import DenseEquation
+from solver.motion.terms import dense_equation
 from solver.parallel import Parallel
 from solver.scene import Criteria, Numerics, Output, PowerLaw, Shear, Start, Trap, Vesicle
 from solver.simulation import simulate as simulate_module
@@ -201,7 +203,7 @@ def test_a_fixed_number_is_never_raised() -> None:
 
 def test_membranes_need_a_number_of_points() -> None:
     with pytest.raises(ValueError, match="'auto'"):
-        DenseEquation.of(adaptive(single(0.9)))
+        dense_equation(adaptive(single(0.9)))
 
 
 # Whole runs.
@@ -247,13 +249,13 @@ def _moments(scene: Scene, frames: Frames) -> Array:
 
 def test_the_work_of_all_parts_adds_up(monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[DenseEquation] = []
-    original = DenseEquation.of
+    original = terms.dense_equation
 
     def of(scene: Scene, parallel: Parallel) -> DenseEquation:
         made.append(original(scene, parallel))
         return made[-1]
 
-    monkeypatch.setattr(DenseEquation, "of", of)
+    monkeypatch.setattr(terms, "dense_equation", of)
     script = scripted(monkeypatch, 32, {0.5: 48, 1.0: 64})
     run = simulate(fixed(shear_pair(1.5, **fixed_horizon(2.0)), 32))
     assert [equation.membranes.points for equation in made] == [32, 48, 64]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.analysis.run import Array, Run
-from solver.motion.dense import DenseEquation
+from solver.motion.terms import dense_equation
 from solver.simulation.resolution import with_points
 
 
@@ -69,7 +69,7 @@ def contact_region(run: Run) -> ContactRegion:
     """
     frames = run.frames
     points = frames.tangent_angle.shape[-1]
-    equation = DenseEquation.of(with_points(run.scene, points))
+    equation = dense_equation(with_points(run.scene, points))
     membranes = equation.membranes
     computed = slice(membranes.count)  # the others are images
     motion = equation.motion(membranes.pack(frames.tangent_angle[-1, computed], frames.center[-1, computed]))

@@ -1,0 +1,114 @@
+"""From a scene to its equation of motion.
+
+This is the one place where a scene becomes the terms that it has, in one of two forms: with matrices over all
+points, or with sums.  What a scene does not have is never constructed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from solver.forces.adhesion import DirectAdhesion
+from solver.forces.bending import bending_of
+from solver.forces.coarsened_adhesion import adhesion_of_many
+from solver.forces.summed_tension import SummedInextensibility
+from solver.forces.tension import ROUND_OFF, Inextensibility
+from solver.membrane.geometry import Membranes
+from solver.membrane.symmetry import independent_vesicles
+from solver.motion.dense import DenseEquation
+from solver.motion.equation import EquationOfMotion, accuracy_of
+from solver.motion.summed import SummedEquation
+from solver.parallel import SERIAL, Parallel
+from solver.potentials.single_layer import SingleLayer
+from solver.potentials.summed_single_layer import SummedSingleLayer
+from solver.potentials.viscosity_contrast import ViscosityContrast, contrasts
+from solver.scene import Scene
+
+
+def equation_of_motion(scene: Scene, parallel: Parallel = SERIAL) -> EquationOfMotion:
+    """Make the equation of motion of a scene, in the form that serves it better.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its number of points is given.
+    parallel : Parallel
+        The ranks that compute the run together.
+
+    Returns
+    -------
+    EquationOfMotion
+    """
+    return summed_equation(scene, parallel) if scene.many else dense_equation(scene, parallel)
+
+
+def dense_equation(scene: Scene, parallel: Parallel = SERIAL) -> DenseEquation:
+    """Make the equation of motion with matrices over all points.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its number of points is given.
+    parallel : Parallel
+        The ranks that compute the terms together.
+
+    Returns
+    -------
+    DenseEquation
+    """
+    membranes = Membranes.of_scene(scene)
+    adhesion = None
+    several = membranes.curves > 1
+    accuracy = accuracy_of(scene.numerics)
+    contrast = contrasts(independent_vesicles(scene))
+    differ = bool(np.any(contrast != 1))
+    if scene.adhesion and several:
+        adhesion = DirectAdhesion(scene.adhesion, accuracy, membranes, parallel)
+    return DenseEquation(
+        membranes=membranes,
+        bending=bending_of(membranes),
+        adhesion=adhesion,
+        flow=scene.flow,
+        inextensibility=Inextensibility(accuracy, 1e-3 * accuracy if several else ROUND_OFF),
+        layer=SingleLayer(membranes, accuracy, parallel),
+        contrast=ViscosityContrast(contrast, membranes, accuracy) if differ else None,
+    )
+
+
+def summed_equation(scene: Scene, parallel: Parallel = SERIAL) -> SummedEquation:
+    """Make the equation of motion with sums.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its number of points is given, and it has no viscosity contrast.
+    parallel : Parallel
+        The ranks that compute the terms together.
+
+    Returns
+    -------
+    SummedEquation
+    """
+    membranes = Membranes.of_scene(scene)
+    accuracy = accuracy_of(scene.numerics)
+    adhesion = None
+    if scene.adhesion:
+        adhesion = adhesion_of_many(scene.adhesion, accuracy, membranes, parallel)
+
+    def isolated(vesicle: int) -> DenseEquation:
+        alone = scene.model_copy(update={"vesicles": (scene.vesicles[vesicle],), "adhesion": None})
+        # The others count as well: what their sums leave over must not be divided by round-off.
+        return replace(dense_equation(alone), inextensibility=Inextensibility(accuracy, 1e-3 * accuracy))
+
+    return SummedEquation(
+        parallel=parallel,
+        membranes=membranes,
+        bending=bending_of(membranes),
+        adhesion=adhesion,
+        flow=scene.flow,
+        inextensibility=SummedInextensibility(accuracy),
+        layer=SummedSingleLayer(membranes, accuracy, parallel),
+        isolated=isolated,
+    )
