@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from solver.analysis.revolutions import RevolutionTracker
 from solver.analysis.run import Outcome, Series, Viscosity
-from solver.scene import Scene
+
+if TYPE_CHECKING:
+    from solver.analysis.revolutions import RevolutionTracker
+    from solver.scene import Scene
 
 Array = NDArray[np.float64]
 

@@ -7,13 +7,16 @@ are somewhat nearer than δ.  So a pair in contact stays together unless the flo
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from solver.membrane.geometry import Geometry
+if TYPE_CHECKING:
+    from solver.membrane.geometry import Geometry
 
 Array = NDArray[np.float64]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,11 +11,13 @@ from numpy.typing import NDArray
 from solver.analysis.contacts import CONTACT, clusters
 from solver.analysis.rheology import adhesion_stress, membrane_stress
 from solver.membrane import curve
-from solver.membrane.geometry import Membranes
 from solver.membrane.symmetry import independent_vesicles
 from solver.motion.equation import EquationOfMotion, Motion
 from solver.potentials.neighbors import gap
-from solver.scene import Scene, Vesicle
+
+if TYPE_CHECKING:
+    from solver.membrane.geometry import Membranes
+    from solver.scene import Scene, Vesicle
 
 Array = NDArray[np.float64]
 Measure = Callable[[Motion], float]

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.analysis.revolutions import RevolutionTracker, crossing
-from solver.integrators import Step
-from solver.membrane.geometry import Membranes
+
+if TYPE_CHECKING:
+    from solver.integrators import Step
+    from solver.membrane.geometry import Membranes
 
 Array = NDArray[np.float64]
 

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.analysis.contacts import cluster_sizes
 from solver.analysis.diagnostics import measures, state_rate, vesicle_measures
-from solver.analysis.line_of_centers import LineOfCenters
 from solver.analysis.run import Frames, Series, VesicleSeries
 from solver.analysis.spatial_error import shape_tails
-from solver.integrators import Step
 from solver.membrane.geometry import Geometry
 from solver.membrane.resampling import resampled_angle, resampled_state
 from solver.membrane.spectral import resampled
 from solver.motion.equation import EquationOfMotion, Motion
 from solver.potentials.proximity import waist_error
-from solver.scene import Scene
+
+if TYPE_CHECKING:
+    from solver.analysis.line_of_centers import LineOfCenters
+    from solver.integrators import Step
+    from solver.scene import Scene
 
 Array = NDArray[np.float64]
 

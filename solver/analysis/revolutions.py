@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from solver.integrators import Step
 from solver.membrane import curve
-from solver.membrane.geometry import Membranes
-from solver.scene import Scene
+
+if TYPE_CHECKING:
+    from solver.integrators import Step
+    from solver.membrane.geometry import Membranes
+    from solver.scene import Scene
 
 Array = NDArray[np.float64]
 

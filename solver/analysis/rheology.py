@@ -6,11 +6,14 @@ is that of all vesicles (Quaife et al. 2019, section V; the sign follows from th
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.membrane.geometry import Geometry
-from solver.motion.equation import Motion
+if TYPE_CHECKING:
+    from solver.membrane.geometry import Geometry
+    from solver.motion.equation import Motion
 
 Array = NDArray[np.float64]
 

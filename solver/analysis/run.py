@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.scene import Scene
+if TYPE_CHECKING:
+    from solver.scene import Scene
 
 Array = NDArray[np.float64]
 

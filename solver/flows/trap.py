@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 from solver.flows.extension import Extension
-from solver.flows.imposed_flow import Array
 from solver.flows.linear import LinearFlow
+
+if TYPE_CHECKING:
+    from solver.flows.imposed_flow import Array
 
 
 class Trap(LinearFlow):

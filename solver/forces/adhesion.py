@@ -8,21 +8,23 @@ is close to it.
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.forces.pair_formulas import formula_and_parameters
 from solver.forces.pair_sums import add_density, add_stiffness, fill_hessian, summed_energy
-from solver.membrane.geometry import Geometry, Membranes
 from solver.membrane.spectral import interpolations
 from solver.pair_potentials.cutoff import switch_error
-from solver.pair_potentials.pair_potential import PairPotential
 from solver.parallel import SERIAL, Parallel, Shares
-from solver.potentials.proximity import Proximity
 from solver.potentials.quadrature import required_ratio, trapezoid_error
 from solver.potentials.refinement import MAXIMUM_FACTOR, Refinement, sum_costs, within
+
+if TYPE_CHECKING:
+    from solver.membrane.geometry import Geometry, Membranes
+    from solver.pair_potentials.pair_potential import PairPotential
+    from solver.potentials.proximity import Proximity
 
 Array = NDArray[np.float64]
 

@@ -5,11 +5,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.membrane.geometry import Geometry, Membranes
 from solver.membrane.spectral import differentiation
+
+if TYPE_CHECKING:
+    from solver.membrane.geometry import Geometry, Membranes
 
 Array = NDArray[np.float64]
 

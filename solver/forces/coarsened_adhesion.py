@@ -8,7 +8,7 @@ points and over its points is added.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,11 +24,13 @@ from solver.forces.pair_sums import (
     pair_energy,
     summed_energy,
 )
-from solver.membrane.geometry import Geometry, Membranes
-from solver.pair_potentials.pair_potential import PairPotential
-from solver.parallel import Parallel, Shares
-from solver.potentials.proximity import Proximity
 from solver.potentials.refinement import sum_costs, within
+
+if TYPE_CHECKING:
+    from solver.membrane.geometry import Geometry, Membranes
+    from solver.pair_potentials.pair_potential import PairPotential
+    from solver.parallel import Parallel, Shares
+    from solver.potentials.proximity import Proximity
 
 Array = NDArray[np.float64]
 

@@ -11,14 +11,16 @@ import hashlib
 import inspect
 from collections.abc import Callable
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numba import types
 from numba.extending import NativeValue, models, overload, register_model, typeof_impl, unbox
 
 from solver.compilation import compiled
 from solver.pair_potentials.cutoff import truncate
-from solver.pair_potentials.pair_potential import Derivatives, Formula, PairPotential
+
+if TYPE_CHECKING:
+    from solver.pair_potentials.pair_potential import Derivatives, Formula, PairPotential
 
 _FORMULAS: dict[str, Formula] = {}  # by the name that their types have
 

@@ -5,17 +5,19 @@ The preconditioner is each vesicle's own inverse.  The iteration begins with a t
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.compilation import compiled
 from solver.forces.tension import Inextensible, TensionNotFoundError
-from solver.membrane.geometry import Geometry, Membranes
 from solver.membrane.spectral import differentiation
-from solver.parallel import Shares
-from solver.potentials.summed_single_layer import SummedSingleLayer
+
+if TYPE_CHECKING:
+    from solver.membrane.geometry import Geometry, Membranes
+    from solver.parallel import Shares
+    from solver.potentials.summed_single_layer import SummedSingleLayer
 
 Array = NDArray[np.float64]
 

@@ -12,15 +12,17 @@ move, because A does not change when a membrane is rotated or shifted.
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 
 from solver.compilation import compiled
-from solver.membrane.geometry import Geometry
 from solver.membrane.spectral import differentiation
+
+if TYPE_CHECKING:
+    from solver.membrane.geometry import Geometry
 
 Array = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import ClassVar, Self
+from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +20,10 @@ from scipy.integrate import BDF
 from scipy.sparse import csc_array
 
 from solver.integrators.integrator import InitialValueProblem, Integrator, Step, StepFailedError, register
-from solver.motion.jacobian import Jacobian
-from solver.scene import Numerics
+
+if TYPE_CHECKING:
+    from solver.motion.jacobian import Jacobian
+    from solver.scene import Numerics
 
 Array = NDArray[np.float64]
 

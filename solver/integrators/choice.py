@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from solver.integrators.integrator import FACTORIES, InitialValueProblem, Integrator
-from solver.scene import Numerics
+
+if TYPE_CHECKING:
+    from solver.scene import Numerics
 
 
 def usual_integrator(vesicles: int) -> Literal["bdf", "rosenbrock"]:

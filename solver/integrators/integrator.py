@@ -8,13 +8,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Protocol, Self
+from typing import TYPE_CHECKING, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.motion.jacobian import Jacobian
-from solver.scene import Numerics
+if TYPE_CHECKING:
+    from solver.motion.jacobian import Jacobian
+    from solver.scene import Numerics
 
 Array = NDArray[np.float64]
 

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.integrators.control import Attempt, StepControl, root_mean_square
 from solver.integrators.integrator import DifferentialEquation, InitialValueProblem, Step, StepFailedError
-from solver.motion.jacobian import Jacobian
+
+if TYPE_CHECKING:
+    from solver.motion.jacobian import Jacobian
 
 Array = NDArray[np.float64]
 

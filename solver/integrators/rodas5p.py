@@ -5,13 +5,17 @@ It keeps order 4 or more on stiff parabolic problems (Steinebach 2023).
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from solver.integrators.control import AdaptiveStep, EmbeddedError
 from solver.integrators.integrator import InitialValueProblem, Integrator, register
 from solver.integrators.one_step import OneStepIntegrator
 from solver.integrators.rosenbrock import Rosenbrock, Tableau
-from solver.scene import Numerics
+
+if TYPE_CHECKING:
+    from solver.scene import Numerics
 
 _STAGE = np.zeros((8, 8))
 _STAGE[1, :1] = [3.0]

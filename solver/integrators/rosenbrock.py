@@ -6,12 +6,15 @@ See (Hairer & Wanner 1996, section IV.7).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.integrators.control import Attempt
-from solver.integrators.one_step import Linearization
+
+if TYPE_CHECKING:
+    from solver.integrators.one_step import Linearization
 
 Array = NDArray[np.float64]
 

@@ -10,6 +10,8 @@ by more, but would no longer damp these modes, because Lobatto's formula does no
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import KroghInterpolator
@@ -18,7 +20,9 @@ from solver.integrators.collocation import GaussLobatto
 from solver.integrators.control import AdaptiveStep, Attempt, ConservedError, EmbeddedError, ErrorMeasure
 from solver.integrators.integrator import InitialValueProblem, Integrator, register
 from solver.integrators.one_step import Linearization, OneStepIntegrator
-from solver.scene import Numerics
+
+if TYPE_CHECKING:
+    from solver.scene import Numerics
 
 Array = NDArray[np.float64]
 

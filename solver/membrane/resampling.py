@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.membrane.geometry import Membranes
 from solver.membrane.spectral import resampled
+
+if TYPE_CHECKING:
+    from solver.membrane.geometry import Membranes
 
 Array = NDArray[np.float64]
 

@@ -8,14 +8,11 @@ terms of u are changed (`ViscosityContrast`).
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.flows import ImposedFlow
-from solver.forces.adhesion import DirectAdhesion
-from solver.forces.bending import Bending
-from solver.forces.tension import Inextensibility, TensionInverse
 from solver.membrane.geometry import Geometry, Membranes
 from solver.membrane.spectral import differentiation, highest_modes, integration
 from solver.membrane.tangential_velocity import (
@@ -26,8 +23,14 @@ from solver.membrane.tangential_velocity import (
 from solver.motion.equation import Motion, conserved_quantities
 from solver.motion.jacobian import DenseJacobian
 from solver.potentials.proximity import Closeness
-from solver.potentials.single_layer import SingleLayer
-from solver.potentials.viscosity_contrast import ViscosityContrast
+
+if TYPE_CHECKING:
+    from solver.flows import ImposedFlow
+    from solver.forces.adhesion import DirectAdhesion
+    from solver.forces.bending import Bending
+    from solver.forces.tension import Inextensibility, TensionInverse
+    from solver.potentials.single_layer import SingleLayer
+    from solver.potentials.viscosity_contrast import ViscosityContrast
 
 Array = NDArray[np.float64]
 

@@ -14,19 +14,21 @@ which recording asks for, reads it and leaves it as it is.  What is recorded nev
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.forces.bending import Bending
-from solver.membrane.geometry import Geometry, Membranes
 from solver.membrane.spectral import highest_modes
 from solver.membrane.tangential_velocity import add_tangential_motion
-from solver.motion.jacobian import Jacobian
-from solver.potentials.proximity import Proximity
-from solver.potentials.viscosity_contrast import ViscosityContrast
-from solver.scene import Numerics
+
+if TYPE_CHECKING:
+    from solver.forces.bending import Bending
+    from solver.membrane.geometry import Geometry, Membranes
+    from solver.motion.jacobian import Jacobian
+    from solver.potentials.proximity import Proximity
+    from solver.potentials.viscosity_contrast import ViscosityContrast
+    from solver.scene import Numerics
 
 Array = NDArray[np.float64]
 

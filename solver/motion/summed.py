@@ -4,24 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.flows import ImposedFlow
-from solver.forces.adhesion import DirectAdhesion
-from solver.forces.bending import Bending
-from solver.forces.coarsened_adhesion import CoarsenedAdhesion
 from solver.forces.summed_tension import Preconditioner, SummedInextensibility
 from solver.forces.tension import TensionInverse, TensionNotFoundError
 from solver.membrane.geometry import Geometry, Membranes
-from solver.motion.dense import DenseEquation
 from solver.motion.equation import Motion, conserved_quantities
 from solver.motion.jacobian import BlockDiagonal
-from solver.parallel import Parallel, Shares
 from solver.potentials.neighbors import Neighbors
-from solver.potentials.summed_single_layer import SummedSingleLayer
+
+if TYPE_CHECKING:
+    from solver.flows import ImposedFlow
+    from solver.forces.adhesion import DirectAdhesion
+    from solver.forces.bending import Bending
+    from solver.forces.coarsened_adhesion import CoarsenedAdhesion
+    from solver.motion.dense import DenseEquation
+    from solver.parallel import Parallel, Shares
+    from solver.potentials.summed_single_layer import SummedSingleLayer
 
 Array = NDArray[np.float64]
 

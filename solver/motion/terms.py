@@ -7,6 +7,7 @@ points, or with sums.  What a scene does not have is never constructed.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,7 +25,9 @@ from solver.parallel import SERIAL, Parallel
 from solver.potentials.single_layer import SingleLayer
 from solver.potentials.summed_single_layer import SummedSingleLayer
 from solver.potentials.viscosity_contrast import ViscosityContrast, contrasts
-from solver.scene import Scene
+
+if TYPE_CHECKING:
+    from solver.scene import Scene
 
 
 def equation_of_motion(scene: Scene, parallel: Parallel = SERIAL) -> EquationOfMotion:

@@ -16,15 +16,19 @@ Wu & Veerapaneni 2015).
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.compilation import compiled
-from solver.membrane.geometry import Geometry, Membranes
 from solver.membrane.spectral import differentiation
 from solver.potentials.close_evaluation import END, continuation_weights
-from solver.potentials.proximity import Closeness
 from solver.potentials.quadrature import required_ratio
+
+if TYPE_CHECKING:
+    from solver.membrane.geometry import Geometry, Membranes
+    from solver.potentials.proximity import Closeness
 
 Array = NDArray[np.float64]
 

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from solver.compilation import compiled
-from solver.membrane.geometry import Geometry
 from solver.membrane.spectral import interpolation, interpolations
 from solver.potentials.refinement import MAXIMUM_FACTOR, Refinement, group_targets
 from solver.potentials.stokeslets import distances, pair_distances
+
+if TYPE_CHECKING:
+    from solver.membrane.geometry import Geometry
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

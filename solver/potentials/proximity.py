@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.membrane.geometry import Geometry
 from solver.membrane.spectral import interpolations
 from solver.potentials.refinement import MAXIMUM_FACTOR, Refinement, group_targets
 from solver.potentials.stokeslets import pair_distances, waists
+
+if TYPE_CHECKING:
+    from solver.membrane.geometry import Geometry
 
 Array = NDArray[np.float64]
 

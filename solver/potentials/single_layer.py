@@ -8,17 +8,21 @@ close (`refinement`), and Cauchy sums where it is very close (`close_evaluation`
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.membrane.geometry import Geometry, Membranes
 from solver.membrane.spectral import differentiation
 from solver.parallel import SERIAL, Parallel
 from solver.potentials import stokeslets
 from solver.potentials.close_evaluation import close_single_layer, logarithm_correction, refine_single_layer
-from solver.potentials.proximity import Closeness
 from solver.potentials.quadrature import required_ratio
 from solver.potentials.refinement import LARGEST_REFINED, Refinement, sum_costs, within
+
+if TYPE_CHECKING:
+    from solver.membrane.geometry import Geometry, Membranes
+    from solver.potentials.proximity import Closeness
 
 Array = NDArray[np.float64]
 

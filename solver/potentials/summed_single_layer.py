@@ -10,21 +10,25 @@ evaluation and the trapezoid rule is kept in small blocks as long as the geometr
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.compilation import compiled
-from solver.membrane.geometry import Geometry, Membranes
 from solver.membrane.spectral import differentiation
-from solver.parallel import Parallel, Shares
 from solver.potentials.close_evaluation import close_stokeslets, logarithm_correction
 from solver.potentials.multipoles import LARGEST_ORDER, orders_between, write_coefficients
 from solver.potentials.multipoles import velocity as summed_velocity
-from solver.potentials.proximity import Proximity
 from solver.potentials.quadrature import required_ratio
 from solver.potentials.refinement import LARGEST_REFINED, Refinement, interpolation_to, refined_points, within
 from solver.potentials.single_layer import row_costs
 from solver.potentials.stokeslets import stokeslets
+
+if TYPE_CHECKING:
+    from solver.membrane.geometry import Geometry, Membranes
+    from solver.parallel import Parallel, Shares
+    from solver.potentials.proximity import Proximity
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

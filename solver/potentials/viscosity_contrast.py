@@ -11,16 +11,19 @@ The mobility K⁻¹S that takes the place of S is symmetric as S is, by the reci
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 
-from solver.membrane.geometry import Geometry, Membranes
 from solver.potentials.double_layer import DoubleLayer
-from solver.potentials.proximity import Closeness
-from solver.potentials.single_layer import SingleLayer
-from solver.scene.vesicle import Vesicle
+
+if TYPE_CHECKING:
+    from solver.membrane.geometry import Geometry, Membranes
+    from solver.potentials.proximity import Closeness
+    from solver.potentials.single_layer import SingleLayer
+    from solver.scene.vesicle import Vesicle
 
 Array = NDArray[np.float64]
 

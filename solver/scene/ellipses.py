@@ -10,12 +10,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.scene.vesicle import Vesicle
+if TYPE_CHECKING:
+    from solver.scene.vesicle import Vesicle
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]

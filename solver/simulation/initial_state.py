@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.membrane.geometry import Membranes
 from solver.membrane.shapes import ellipse_tangent_angle, of_reduced_area
 from solver.membrane.symmetry import independent_vesicles
-from solver.scene import Scene
+
+if TYPE_CHECKING:
+    from solver.scene import Scene
 
 Array = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ the sum over adhesion.
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +21,10 @@ from solver.motion.equation import accuracy_of
 from solver.potentials.neighbors import Neighbors
 from solver.potentials.proximity import Closeness, waist_error
 from solver.potentials.refinement import MAXIMUM_FACTOR
-from solver.scene import Scene
 from solver.simulation.initial_state import initial_ellipses
+
+if TYPE_CHECKING:
+    from solver.scene import Scene
 
 Array = NDArray[np.float64]
 

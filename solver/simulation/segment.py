@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.integrators import InitialValueProblem, Integrator, Step, integrator_for
-from solver.membrane.geometry import Membranes
-from solver.motion.equation import EquationOfMotion
-from solver.scene import Scene
+
+if TYPE_CHECKING:
+    from solver.membrane.geometry import Membranes
+    from solver.motion.equation import EquationOfMotion
+    from solver.scene import Scene
 
 Array = NDArray[np.float64]
 

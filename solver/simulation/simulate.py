@@ -6,6 +6,7 @@ import time as clock
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +18,13 @@ from solver.integrators import StepFailedError
 from solver.membrane.geometry import Membranes
 from solver.motion.terms import equation_of_motion
 from solver.parallel import SERIAL, Parallel, first_rank_asks
-from solver.scene import Scene
 from solver.simulation.blas_threads import one_blas_thread
 from solver.simulation.initial_state import initial_ellipses, rotated_state
 from solver.simulation.resolution import UnresolvedError, resolution_of, with_points
 from solver.simulation.time_loop import TimeLoop
+
+if TYPE_CHECKING:
+    from solver.scene import Scene
 
 Array = NDArray[np.float64]
 

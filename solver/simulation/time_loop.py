@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +15,13 @@ from solver.analysis.revolutions import LongAxisTracker, RevolutionTracker, may_
 from solver.analysis.run import Outcome
 from solver.integrators import Step, StepFailedError
 from solver.membrane.resampling import resampled_state
-from solver.motion.equation import EquationOfMotion
 from solver.parallel import Parallel, require_agreement
-from solver.scene import Scene
 from solver.simulation.resolution import Resolution, with_points
 from solver.simulation.segment import Segment, SegmentWork
+
+if TYPE_CHECKING:
+    from solver.motion.equation import EquationOfMotion
+    from solver.scene import Scene
 
 Array = NDArray[np.float64]
 

@@ -5,15 +5,17 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.analysis.line_of_centers import LineOfCenters
-from solver.analysis.revolutions import LongAxisTracker
-from solver.analysis.run import Outcome
-from solver.membrane.geometry import Membranes
-from solver.scene import Scene
+if TYPE_CHECKING:
+    from solver.analysis.line_of_centers import LineOfCenters
+    from solver.analysis.revolutions import LongAxisTracker
+    from solver.analysis.run import Outcome
+    from solver.membrane.geometry import Membranes
+    from solver.scene import Scene
 
 Array = NDArray[np.float64]
 

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from solver.analysis.criteria.criterion import Criterion, History
 from solver.analysis.run import Outcome
-from solver.scene import Scene
+
+if TYPE_CHECKING:
+    from solver.scene import Scene
 
 
 class Revolved(Criterion):

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from solver.analysis.criteria.criterion import Criterion, History
 from solver.analysis.criteria.revolved import Revolved
 from solver.analysis.run import Outcome
 from solver.membrane import curve
-from solver.scene import Scene
+
+if TYPE_CHECKING:
+    from solver.scene import Scene
 
 
 class Steady(Criterion):

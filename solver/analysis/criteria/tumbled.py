@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from solver.analysis.criteria.criterion import Criterion, History
 from solver.analysis.revolutions import may_tumble
 from solver.analysis.run import Outcome
-from solver.scene import Scene
+
+if TYPE_CHECKING:
+    from solver.scene import Scene
 
 
 class Tumbled(Criterion):
