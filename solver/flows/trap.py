@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar, Literal
+from collections.abc import Mapping
+from typing import ClassVar, Literal
 
-from solver.flows.extension import Extension
+import numpy as np
+
+from solver.flows.imposed_flow import Array, Symbol
 from solver.flows.linear import LinearFlow
-
-if TYPE_CHECKING:
-    from solver.flows.imposed_flow import Array
 
 
 class Trap(LinearFlow):
@@ -20,10 +20,10 @@ class Trap(LinearFlow):
     kind: Literal["trap"] = "trap"
 
     title: ClassVar[str] = "a fluid trap"
-    symbols = Extension.symbols
+    symbols: ClassVar[Mapping[str, Symbol]] = {"rate": Symbol("extension rate", r"\dot{\epsilon}", "ε̇")}
     strains: ClassVar[bool] = True
     extends_pairs: ClassVar[bool] = True
-    unit_gradient = Extension.unit_gradient
+    unit_gradient: ClassVar[Array] = np.array([[-1.0, 0.0], [0.0, 1.0]])
 
     def velocity(self, points: Array, centers: Array) -> Array:
         """Return the velocity at points.

@@ -1,11 +1,17 @@
 """When a run is decided, and how: one outcome criterion a module.  `solver/README.md` says how to add one."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from solver.analysis.criteria.criterion import Criterion, History
 from solver.analysis.criteria.revolved import Revolved
 from solver.analysis.criteria.separated import Separated
 from solver.analysis.criteria.steady import Steady
 from solver.analysis.criteria.tumbled import Tumbled
-from solver.scene import Scene
+
+if TYPE_CHECKING:
+    from solver.scene import Scene
 
 # In the order in which they are asked; the first one with an answer decides.
 CRITERIA: list[type[Criterion]] = [Separated, Tumbled, Revolved, Steady]
