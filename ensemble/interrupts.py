@@ -3,26 +3,31 @@
 from __future__ import annotations
 
 import os
+import select
 import signal
 import sys
 import threading
+import time
 from types import FrameType
 
 from ensemble.errors import Interrupted
-from ensemble.mpi.world import launched_rank, launched_size
+from ensemble.mpi.world import has_joined, is_launched, launched_rank, launched_size
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 UNWINDING_SECONDS = 1.0
+PARENT_CHECK_SECONDS = 0.2
+LAUNCHER_CONNECTION = "PMI_FD"  # number of the open socket to the launcher's helper, where there is one
+SHOW_CURSOR = "\x1b[?25h"  # a progress display hides it
 
 
 def end_with_one_line() -> None:
     """Make SIGINT and SIGTERM end this process within two seconds, whatever it is doing.
 
     Alone, the process unwinds: `Interrupted` is raised, and what it was writing is removed.  If a thread
-    keeps it, it is ended after `UNWINDING_SECONDS`.  Under an MPI launcher the main thread may be inside a
-    collective that never returns, because another rank has ended already.  So there another thread ends the
-    process at once.  Nothing is lost by that: a run exists once it is committed, and what is not committed is
-    adopted or removed when the store is opened next.
+    keeps it, or a library swallows the exception, it is ended after `UNWINDING_SECONDS`.  Under an MPI
+    launcher the main thread may be inside a collective that never returns, because another rank has ended
+    already.  So there another thread ends the process at once.  Nothing is lost by that: a run exists once it
+    is committed, and what is not committed is adopted or removed when the store is opened next.
     """
     if launched_size() == 1:
         for number in SIGNALS:
@@ -37,10 +42,43 @@ def end_with_one_line() -> None:
     threading.Thread(target=_end, args=(reader,), name="signals", daemon=True).start()
 
 
+def end_with_launcher() -> None:
+    """Let this process end when the one that launched it does, if it has been launched.
+
+    An MPI launcher that is killed takes its ranks along, but its helper on each node does not: ranks that
+    lost it would simulate on, unrecorded.  A new parent is the sign.  A helper that died before this call is
+    known by the connection that it left.
+    """
+    if not is_launched():
+        return
+    parent = os.getppid()
+    if _is_cut_off():
+        os._exit(1)
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(PARENT_CHECK_SECONDS)
+        os._exit(1)
+
+    threading.Thread(target=watch, name="parent-watch", daemon=True).start()
+
+
+def _is_cut_off() -> bool:
+    """Whether the launcher's helper has closed its end of the connection.  To be asked before MPI uses it."""
+    if LAUNCHER_CONNECTION not in os.environ:
+        return False
+    connection = select.poll()
+    connection.register(int(os.environ[LAUNCHER_CONNECTION]), 0)
+    return any(event & select.POLLHUP for _, event in connection.poll(0))
+
+
 def _unwind(number: int, _: FrameType | None) -> None:
     interruption = Interrupted(number)
     for again in SIGNALS:  # a second signal ends the process at once
         signal.signal(again, lambda *_: os._exit(interruption.status))
+    # Whatever comes of it, in a destructor or in a library, is no error to be shown.
+    sys.unraisablehook = lambda _: None
+    sys.excepthook = lambda *_: os._exit(interruption.status)
     _say_interrupted()
     watchdog = threading.Timer(UNWINDING_SECONDS, os._exit, (interruption.status,))
     watchdog.daemon = True
@@ -51,15 +89,20 @@ def _unwind(number: int, _: FrameType | None) -> None:
 def _end(reader: int) -> None:
     (number,) = os.read(reader, 1)
     _say_interrupted()
+    if not has_joined():
+        # The other ranks would wait for this one, and the launcher ends them only if a signal has ended it.
+        os.kill(os.getpid(), signal.SIGKILL)
     os._exit(Interrupted(number).status)
 
 
 def _say_interrupted() -> None:
     """Print on the first rank what an interruption leaves."""
-    if launched_rank() == 0:
-        # The stream of the process: the command line may have put another one in its place.
+    # The stream of the process: the command line may have put another one in its place.
+    stream = sys.__stderr__
+    if launched_rank() == 0 and stream is not None:
+        cursor = SHOW_CURSOR if stream.isatty() else ""
         print(
-            "ensemble: interrupted; finished runs are kept and the same command goes on",
-            file=sys.__stderr__,
+            f"{cursor}ensemble: interrupted; finished runs are kept and the same command goes on",
+            file=stream,
             flush=True,
         )

@@ -24,7 +24,7 @@ def main() -> None:
     # sessions the niceness of a process means nothing.  Not every kernel weighs sessions.
     with suppress(OSError):
         _weigh_session()
-    from ensemble.cli.main import main as run
+    from ensemble.__main__ import main as run
 
     sys.argv[0] = "ensemble"
     run()

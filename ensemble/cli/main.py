@@ -13,7 +13,7 @@ from typing import Annotated
 import typer
 
 from ensemble.cli import question_commands, report_commands, schema_command, store_commands
-from ensemble.errors import BadInput, EnsembleError, Interrupted
+from ensemble.errors import BadInput, EnsembleError
 from ensemble.mpi.world import only_first_rank_speaks, pin_threads
 
 GROUP = "ensemble.commands"  # of entry points: functions that other distributions add as commands
@@ -55,8 +55,8 @@ def _options(
 def main() -> None:
     """Run the command line.
 
-    Bad input ends it with status 2, trouble with the machine or the store with status 1, and a signal with
-    128 and its number; each with one line.
+    Bad input ends it with status 2, and trouble with the machine or the store with status 1; each with one
+    line.
     """
     pin_threads()
     for stream in (sys.stdout, sys.stderr):
@@ -73,8 +73,6 @@ def main() -> None:
         except (EnsembleError, OSError) as error:
             print(f"ensemble: {error}", file=sys.stderr)
             sys.exit(1)
-        except Interrupted as interruption:
-            sys.exit(interruption.status)
 
 
 if __name__ == "__main__":

@@ -13,7 +13,6 @@ import typer
 from ensemble.cli.options import AsJson, Changes, Document, ProgressAs, ProgressFormat, RanksPerRun, StorePath
 from ensemble.cli.printing import print_json, print_table
 from ensemble.config.defaults import DEFAULT_STORE, DEFAULT_STUDY
-from ensemble.mpi.world import launched_rank
 
 if TYPE_CHECKING:
     from ensemble.questions import Answer, Question
@@ -58,7 +57,7 @@ def run(  # numpydoc ignore=PR01
 
     The exit status is 1 if it failed numerically.
     """
-    if again and store is not None and launched_rank() == 0:
+    if again and store is not None:
         _set_aside(scene, changes, store)
     answer_and_print("scene", scene, changes, store, ranks_per_run, progress, as_json)
 
@@ -67,17 +66,23 @@ COMMANDS = (bisect, run)
 
 
 def _set_aside(scene: str, changes: list[str], path: Path) -> None:
-    """Take the run of a scene out of a store that has it."""
+    """Take the run of a scene out of a store that has it.  Collective."""
     from ensemble.config.overrides import parse_override
     from ensemble.errors import refusing
+    from ensemble.mpi.world import abort_guard, launched_size, on_root, world
     from ensemble.questions import kind_named
     from ensemble.store import Store
 
-    with refusing():
-        question = kind_named("scene").load(scene, dict(map(parse_override, changes)))
-        with Store.open(path) as store:
-            if store.contains(question.key):
-                store.set_aside(question.key)
+    def set_aside() -> None:
+        with refusing():
+            question = kind_named("scene").load(scene, dict(map(parse_override, changes)))
+            with Store.open(path) as store:
+                if store.contains(question.key):
+                    store.set_aside(question.key)
+
+    communicator = world() if launched_size() > 1 else None
+    with abort_guard(communicator):
+        on_root(communicator, set_aside)
 
 
 def answer_and_print(

@@ -7,8 +7,8 @@ imported when a communicator is requested, so commands that need none run where 
 from __future__ import annotations
 
 import os
+import signal
 import sys
-import threading
 import time
 import traceback
 from collections.abc import Callable, Iterator, Mapping
@@ -29,8 +29,8 @@ _RANK_VARIABLES = ("PMI_RANK", "OMPI_COMM_WORLD_RANK", "MV2_COMM_WORLD_RANK", "S
 
 _THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
-_PARENT_CHECK_SECONDS = 0.5
 _FORWARD_SECONDS = 0.3
+_MEETING_SECONDS = 20
 
 
 def pin_threads() -> None:
@@ -76,6 +76,21 @@ def launched_rank(environment: Mapping[str, str] = os.environ) -> int:
     return _first_integer(environment, _RANK_VARIABLES, 0)
 
 
+def is_launched(environment: Mapping[str, str] = os.environ) -> bool:
+    """Tell whether a launcher has started this process, be it the only one.
+
+    Parameters
+    ----------
+    environment : mapping
+        Environment variables.
+
+    Returns
+    -------
+    bool
+    """
+    return any(variable in environment for variable in _RANK_VARIABLES)
+
+
 def _first_integer(environment: Mapping[str, str], variables: tuple[str, ...], default: int) -> int:
     for variable in variables:
         if variable in environment:
@@ -99,8 +114,6 @@ def world() -> Intracomm:
         the ranks were started with different arguments.
     """
     launched = launched_size()
-    if launched > 1:
-        _end_with_parent()
     try:
         from mpi4py import MPI
     except (ImportError, RuntimeError) as error:
@@ -116,15 +129,49 @@ def world() -> Intracomm:
     return MPI.COMM_WORLD
 
 
+def has_joined() -> bool:
+    """Tell whether this process has joined the other ranks: its launcher then ends them with it."""
+    module = sys.modules.get("mpi4py.MPI")
+    is_initialized = getattr(module, "Is_initialized", None)  # not there yet while it is being imported
+    return is_initialized is not None and bool(is_initialized())
+
+
+def fail_with_others() -> None:
+    """Let the other ranks know that this one fails before it has joined them; nothing happens later on.
+
+    They would wait for it for ever: a launcher ignores what ends with a status before MPI has begun.  Ranks
+    that all fail in the same way meet here.  If the others have ended already, a signal ends this process.
+    """
+    if launched_size() == 1 or has_joined():
+        return
+    signal.signal(signal.SIGALRM, signal.SIG_DFL)
+    signal.alarm(_MEETING_SECONDS)
+    try:
+        from mpi4py import MPI
+    except (ImportError, RuntimeError):
+        return
+    _argument_lists(MPI.COMM_WORLD, could_start=False)
+    signal.alarm(0)
+
+
 def _require_same_arguments(communicator: Intracomm) -> None:
     """Refuse ranks that were started with different arguments: only the first rank's would count."""
-    arguments = communicator.allgather(sys.argv[1:])
-    for rank, other in enumerate(arguments):
-        if other != arguments[0]:
+    ranks = _argument_lists(communicator, could_start=True)
+    first, _ = ranks[0]
+    for rank, (other, could_start) in enumerate(ranks):
+        if other != first:
             raise BadInput(
-                f"arguments: rank {rank} has {' '.join(other)!r} and rank 0 {' '.join(arguments[0])!r}; "
+                f"arguments: rank {rank} has {' '.join(other)!r} and rank 0 {' '.join(first)!r}; "
                 "all ranks of a job carry out one command, so start a job for each"
             )
+        if not could_start:
+            raise BadInput(f"rank {rank}: it could not start")
+
+
+def _argument_lists(communicator: Intracomm, could_start: bool) -> list[tuple[list[str], bool]]:
+    """Tell each rank the arguments of all, and which of them go on.  Collective."""
+    told: list[tuple[list[str], bool]] = communicator.allgather((sys.argv[1:], could_start))
+    return told
 
 
 def on_root(communicator: Intracomm | None, function: Callable[[], T]) -> T:
@@ -201,19 +248,3 @@ def abort_guard(communicator: Intracomm | None) -> Iterator[None]:
         # The launcher stops forwarding output as soon as it hears of the end.
         time.sleep(_FORWARD_SECONDS)
         communicator.Abort(1)
-
-
-def _end_with_parent() -> None:
-    """Let this process end when the process that started it does.
-
-    An MPI launcher that is killed takes its ranks along, but its helper on each node does not: ranks that
-    lost it would simulate on, unrecorded.  A new parent is the sign.
-    """
-    parent = os.getppid()
-
-    def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(_PARENT_CHECK_SECONDS)
-        os._exit(1)
-
-    threading.Thread(target=watch, name="parent-watch", daemon=True).start()

@@ -64,6 +64,28 @@ def test_ranks_with_different_arguments_are_refused(launcher) -> None:
     assert "Traceback" not in result.stderr
 
 
+def test_a_rank_that_refuses_its_arguments_ends_the_others(launcher, tmp_path: Path) -> None:
+    """They would wait for it for ever, at full load."""
+    python = [sys.executable, "-m", "ensemble", "bisect", f"--store={tmp_path / 'store'}"]
+    command = [launcher.mpirun, "-n", "1", *python, ":", "-n", "1", *python, "--nonsense"]
+    result = subprocess.run(
+        command, env=launcher.environment, capture_output=True, text=True, timeout=240, check=False
+    )
+    assert result.returncode == 2
+    (line,) = result.stderr.splitlines()
+    assert line.startswith("ensemble: arguments: rank 1 has")
+    assert not (tmp_path / "store").exists()
+
+
+def test_what_only_the_first_rank_looks_at_is_refused_on_all(launcher, tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    command = ["run", *QUICK, "--again", f"--store={tmp_path / 'file'}"]
+    result = launcher.run(2, [*ENSEMBLE, *command])
+    assert result.returncode == 2
+    (line,) = result.stderr.splitlines()
+    assert "is a file" in line
+
+
 def test_a_rank_in_another_directory_uses_the_store_of_the_first(launcher, tmp_path: Path) -> None:
     """The address of the store is relative, and only the first rank is where it leads to it."""
     (tmp_path / "elsewhere").mkdir()
@@ -141,6 +163,24 @@ def test_stores_are_merged(ensemble, stored_run, finished_study, tmp_path: Path)
     assert ensemble("merge", str(store), "--into", str(target), "--json").stdout.count('"runs": 1') == 1
     assert ensemble("show", key, f"--store={target}").returncode == 0
     assert ensemble("check", f"--store={target}").returncode == 0
+
+
+SIGNALLED_EARLY = """
+import os, signal
+import ensemble.__main__ as command
+if os.environ["PMI_RANK"] == "1":
+    command.end_with_launcher = lambda: os.kill(os.getpid(), signal.SIGTERM)
+command.main()
+"""
+
+
+def test_a_rank_that_a_signal_ends_before_mpi_begins_ends_the_others(launcher, tmp_path: Path) -> None:
+    """A launcher ignores a rank that ends with a status before it has joined the others."""
+    store = tmp_path / "store"
+    result = launcher.run(2, [sys.executable, "-c", SIGNALLED_EARLY, "bisect", f"--store={store}"])
+    assert result.returncode != 0
+    assert "Traceback" not in result.stderr
+    assert alive(str(store)) == []
 
 
 def alive(marker: str) -> list[psutil.Process]:
