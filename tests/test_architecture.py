@@ -43,7 +43,7 @@ ORDER = {
         potentials
         forces
         motion
-        integrators
+        integrators steady_states
         analysis
         simulation
         __init__

@@ -28,6 +28,7 @@ _RESULTS = (
     "outcome",
     "failure",
     "time",
+    "perturbations",
     "period",
     "effective_aspect_ratio",
     "inclination_angle",

@@ -58,6 +58,7 @@ class RunSummary(BaseModel):
     work: Work
     series: tuple[str, ...]
     vesicle_series: tuple[str, ...] = ()
+    perturbations: tuple[float, ...] = ()
 
     @property
     def wall_seconds(self) -> float:

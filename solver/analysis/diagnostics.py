@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from solver.analysis.contacts import CONTACT, clusters
 from solver.analysis.rheology import adhesion_stress, membrane_stress
 from solver.membrane import curve
-from solver.membrane.symmetry import independent_vesicles
 from solver.motion.equation import EquationOfMotion, Motion
 from solver.potentials.neighbors import gap
 
@@ -65,7 +64,7 @@ def measures(scene: Scene, equation: EquationOfMotion) -> dict[str, Measure]:
         By the name of the series, functions of the motion in a state.  What depends on a velocity, a tension
         or a closeness that the motion has not is NaN (`Recorder.record_geometry`).
     """
-    target_area = _areas(independent_vesicles(scene))
+    target_area = _areas(scene.vesicles[: equation.membranes.count])  # the others are images
     measured: dict[str, Measure] = {
         "bending_energy": lambda motion: equation.bending.energy(motion.geometry),
         "area_error": lambda motion: float(np.max(np.abs(motion.geometry.areas / target_area - 1))),

@@ -189,6 +189,8 @@ class Run:
     frames : Frames
     vesicle_series : VesicleSeries
         Diagnostics of each vesicle against time.
+    perturbations : tuple of float
+        Times at which the run rested in an unstable state and was perturbed.
     """
 
     scene: Scene
@@ -206,3 +208,4 @@ class Run:
     series: Series
     frames: Frames
     vesicle_series: VesicleSeries = field(default_factory=dict)
+    perturbations: tuple[float, ...] = ()

@@ -91,7 +91,29 @@ class Membranes:
         ValueError
             If `numerics.points` is "auto".
         """
-        vesicles, points = independent_vesicles(scene), scene.numerics.points
+        return cls.of_some(independent_vesicles(scene), scene)
+
+    @classmethod
+    def of_some(cls, vesicles: Sequence[Vesicle], scene: Scene) -> Self:
+        """Make the membranes if some of a scene's vesicles are computed.
+
+        Parameters
+        ----------
+        vesicles : sequence of Vesicle
+            All of the scene, or those of which the others are images.
+        scene : Scene
+            With a number of points.
+
+        Returns
+        -------
+        Membranes
+
+        Raises
+        ------
+        ValueError
+            If `numerics.points` is "auto".
+        """
+        points = scene.numerics.points
         if points == "auto":
             raise ValueError(
                 "numerics.points is 'auto', expected a number (`solver.simulation.resolution` chooses it)"

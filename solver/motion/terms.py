@@ -27,7 +27,9 @@ from solver.potentials.summed_single_layer import SummedSingleLayer
 from solver.potentials.viscosity_contrast import ViscosityContrast, contrasts
 
 if TYPE_CHECKING:
-    from solver.scene import Scene
+    from solver.scene import Scene, Vesicle
+
+MOST_ACCURATE = 1e-9  # tolerance below which `accuracy_of` does not improve
 
 
 def equation_of_motion(scene: Scene, parallel: Parallel = SERIAL) -> EquationOfMotion:
@@ -61,11 +63,32 @@ def dense_equation(scene: Scene, parallel: Parallel = SERIAL) -> DenseEquation:
     -------
     DenseEquation
     """
-    membranes = Membranes.of_scene(scene)
+    return dense_equation_of(independent_vesicles(scene), scene, parallel)
+
+
+def dense_equation_of(
+    vesicles: tuple[Vesicle, ...], scene: Scene, parallel: Parallel = SERIAL
+) -> DenseEquation:
+    """Make the equation of motion, with matrices, in which some of a scene's vesicles are computed.
+
+    Parameters
+    ----------
+    vesicles : tuple of Vesicle
+        All of the scene, or those of which the others are images.
+    scene : Scene
+        Its number of points is given.
+    parallel : Parallel
+        The ranks that compute the terms together.
+
+    Returns
+    -------
+    DenseEquation
+    """
+    membranes = Membranes.of_some(vesicles, scene)
     adhesion = None
     several = membranes.curves > 1
     accuracy = accuracy_of(scene.numerics)
-    contrast = contrasts(independent_vesicles(scene))
+    contrast = contrasts(vesicles)
     differ = bool(np.any(contrast != 1))
     if scene.adhesion and several:
         adhesion = DirectAdhesion(scene.adhesion, accuracy, membranes, parallel)
@@ -78,6 +101,24 @@ def dense_equation(scene: Scene, parallel: Parallel = SERIAL) -> DenseEquation:
         layer=SingleLayer(membranes, accuracy, parallel),
         contrast=ViscosityContrast(contrast, membranes, accuracy) if differ else None,
     )
+
+
+def accurate_equation(vesicles: tuple[Vesicle, ...], scene: Scene) -> DenseEquation:
+    """Make the equation of motion, with matrices, as accurate as it can be whatever the scene's tolerance.
+
+    Parameters
+    ----------
+    vesicles : tuple of Vesicle
+        See `dense_equation_of`.
+    scene : Scene
+        Its number of points is given.
+
+    Returns
+    -------
+    DenseEquation
+    """
+    numerics = scene.numerics.model_copy(update={"tolerance": MOST_ACCURATE})
+    return dense_equation_of(vesicles, scene.model_copy(update={"numerics": numerics}))
 
 
 def summed_equation(scene: Scene, parallel: Parallel = SERIAL) -> SummedEquation:

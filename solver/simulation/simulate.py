@@ -16,22 +16,31 @@ from solver.analysis.run import LARGEST_SPATIAL, Energy, Errors, Outcome, Run, W
 from solver.forces.tension import TensionNotFoundError
 from solver.integrators import StepFailedError
 from solver.membrane.geometry import Membranes
-from solver.motion.terms import equation_of_motion
+from solver.motion.terms import accurate_equation, equation_of_motion
 from solver.parallel import SERIAL, Parallel, first_rank_asks
 from solver.simulation.blas_threads import one_blas_thread
 from solver.simulation.initial_state import initial_ellipses, rotated_state
 from solver.simulation.resolution import UnresolvedError, resolution_of, with_points
 from solver.simulation.time_loop import TimeLoop
+from solver.steady_states.rest import HiddenInstabilityError, rest_near
+from solver.steady_states.steady_equations import SteadyEquations
 
 if TYPE_CHECKING:
     from solver.scene import Scene
+    from solver.steady_states.rest import Rest
 
 Array = NDArray[np.float64]
 
 # While a start relaxes, whatever the scene records: when the relaxation ends depends on when it is sampled.
 _RELAXATION_OUTPUT = {"interval": 2.0, "frame_interval": 10.0}
 
-_NUMERICAL_FAILURES = (StepFailedError, UnresolvedError, TensionNotFoundError, np.linalg.LinAlgError)
+_NUMERICAL_FAILURES = (
+    StepFailedError,
+    UnresolvedError,
+    TensionNotFoundError,
+    HiddenInstabilityError,
+    np.linalg.LinAlgError,
+)
 
 
 class Cancelled(Exception):  # noqa: N818  the caller wants it, so it is no error
@@ -76,7 +85,8 @@ def simulate(
         start = _start(scene, resolution.points, parallel, should_stop)
         should_stop = first_rank_asks(parallel, should_stop)
         equation_of = partial(equation_of_motion, parallel=parallel)
-        loop = TimeLoop(scene, start.points, start.state, resolution, equation_of, parallel)
+        examine = None if scene.many else partial(_examined, scene)
+        loop = TimeLoop(scene, start.points, start.state, resolution, equation_of, parallel, examine)
         failure = None
         try:
             loop.recorder.record(loop.time, loop.state)
@@ -132,6 +142,13 @@ def _start(scene: Scene, points: int, parallel: Parallel, should_stop: Callable[
     return _Start(points, rotated_state(membranes, last, scene.start.tilt), evaluations)
 
 
+def _examined(scene: Scene, membranes: Membranes, state: Array) -> Rest:
+    """Find out what is behind a state that hardly changes; each rank does, with the same bits."""
+    placed = with_points(scene, membranes.points)
+    equations = SteadyEquations(accurate_equation(scene.vesicles, placed), placed)
+    return rest_near(equations, membranes, state)
+
+
 def _failure(loop: TimeLoop, error: Exception) -> str:
     """Return why a run failed, and see to it that at least its start is recorded."""
     recorder = loop.recorder
@@ -185,4 +202,5 @@ def _finished(
         series=series,
         frames=loop.recorder.frames,
         vesicle_series=loop.recorder.vesicle_series,
+        perturbations=tuple(loop.perturbations),
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,8 +21,10 @@ from solver.simulation.resolution import Resolution, with_points
 from solver.simulation.segment import Segment, SegmentWork
 
 if TYPE_CHECKING:
+    from solver.membrane.geometry import Membranes
     from solver.motion.equation import EquationOfMotion
     from solver.scene import Scene
+    from solver.steady_states.rest import Rest
 
 Array = NDArray[np.float64]
 
@@ -42,6 +45,8 @@ class TimeLoop:
         From a scene whose number of points is given to its `EquationOfMotion`.
     parallel : Parallel
         The ranks that compute the run together.
+    examine : callable or None
+        From membranes and a state that hardly changes to what is behind it (`History`).
 
     Attributes
     ----------
@@ -60,6 +65,8 @@ class TimeLoop:
         Of the accepted steps; None before the first one.
     temporal_error : float
         Sum of the estimated local errors.
+    perturbations : list of float
+        Times at which the run rested in an unstable state and was perturbed.
     """
 
     def __init__(
@@ -70,11 +77,13 @@ class TimeLoop:
         resolution: Resolution,
         equation_of: Callable[[Scene], EquationOfMotion],
         parallel: Parallel,
+        examine: Callable[[Membranes, Array], Rest] | None = None,
     ) -> None:
         self._scene = scene
         self._resolution = resolution
         self._equation_of = equation_of
         self._parallel = parallel
+        self._examine = examine
         self._criteria = criteria_for(scene)
         self.time = 0.0
         self.state = state
@@ -92,6 +101,7 @@ class TimeLoop:
         self.steps = self.rejected_steps = 0
         self.smallest_step: float | None = None
         self.temporal_error = 0.0
+        self.perturbations: list[float] = []
 
     @property
     def done(self) -> bool:
@@ -134,14 +144,27 @@ class TimeLoop:
     def _refine(self, points: int) -> None:
         """Go on from the start of the step with more points."""
         coarse = self.segment.membranes
-        equation = self._equation_of(with_points(self._scene, points))
-        self.segment = Segment(equation, self._scene, self.segment.work)
+        self._take_segment(points)
         self.state = resampled_state(coarse, self.state, self.segment.membranes)
         self.rejected_steps += 1
+        self.begin()
+
+    def _depart(self) -> None:
+        """Go on from the state that a criterion wants, if one does."""
+        for criterion in self._criteria:
+            if criterion.departure is not None:
+                self.state, criterion.departure = criterion.departure, None
+                self.perturbations.append(float(self.time))
+                self._take_segment(self.segment.membranes.points)
+                self.begin()
+
+    def _take_segment(self, points: int) -> None:
+        """Begin the part of the run that has this number of points."""
+        equation = self._equation_of(with_points(self._scene, points))
+        self.segment = Segment(equation, self._scene, self.segment.work)
         self.recorder.continue_with(self.segment.equation)
         if self.tracker:
             self.tracker.membranes = self.segment.membranes
-        self.begin()
 
     def _accept(self, step: Step) -> None:
         # The last step is as long as what is left of the run.
@@ -156,6 +179,7 @@ class TimeLoop:
         self.rejected_steps += step.shortened
         self.temporal_error += step.local_error
         self.outcome = self._decide()
+        self._depart()
 
     def _decide(self) -> Outcome:
         history = History(
@@ -165,6 +189,7 @@ class TimeLoop:
             samples=self.recorder.samples,
             line_of_centers=self._line_of_centers,
             long_axis=self._long_axis,
+            examine=partial(self._examine, self.segment.membranes, self.state) if self._examine else None,
         )
         decisions = (criterion.decide(history) for criterion in self._criteria)
         return next((outcome for outcome in decisions if outcome), Outcome.UNDECIDED)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from solver.analysis.run import Outcome
     from solver.membrane.geometry import Membranes
     from solver.scene import Scene
+    from solver.steady_states.rest import Rest
 
 Array = NDArray[np.float64]
 
@@ -38,6 +39,9 @@ class History:
         Of two vesicles.
     long_axis : LongAxisTracker or None
         Of a single vesicle that may tumble.
+    examine : callable or None
+        Finds out what is behind a state that hardly changes; None for many vesicles, for which it would take
+        too long.
     """
 
     time: float
@@ -46,6 +50,7 @@ class History:
     samples: Mapping[str, Sequence[float]]
     line_of_centers: LineOfCenters | None
     long_axis: LongAxisTracker | None
+    examine: Callable[[], Rest] | None = None
 
 
 class Criterion(ABC):
@@ -54,10 +59,17 @@ class Criterion(ABC):
     Parameters
     ----------
     scene : Scene
+
+    Attributes
+    ----------
+    departure : (n,) or None
+        State with which the run goes on, where the criterion has found that it rests only because nothing
+        disturbs it.  The time loop takes it once.
     """
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
+        self.departure: Array | None = None
 
     @classmethod
     @abstractmethod

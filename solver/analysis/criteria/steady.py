@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from solver.analysis.criteria.criterion import Criterion, History
 from solver.analysis.criteria.revolved import Revolved
@@ -12,15 +13,33 @@ from solver.analysis.run import Outcome
 from solver.membrane import curve
 
 if TYPE_CHECKING:
+    from solver.membrane.geometry import Membranes
     from solver.scene import Scene
+
+Array = NDArray[np.float64]
+
+_LATER = 1.2  # a slow motion is examined again when this multiple of the time has passed
 
 
 class Steady(Criterion):
-    """Shapes and arrangement have not changed faster than ``steady_rate`` for ``steady_time``.
+    """Shapes and arrangement have come to rest in a stable steady state.
+
+    They have not changed faster than ``steady_rate`` for ``steady_time``.  What lies behind such a state is
+    then examined once.  If it is a steady state that is unstable, the run goes on, with a perturbation where
+    the state has a smaller one; if it is a slow motion, the run goes on too.
 
     The outcome is `EQUILIBRIUM` in a fluid at rest.  In a flow that strains, two vesicles are `BOUND` side by
     side, or `END_TO_END`.  Anything else is `STEADY`.
+
+    Parameters
+    ----------
+    scene : Scene
     """
+
+    def __init__(self, scene: Scene) -> None:
+        super().__init__(scene)
+        self._leaves = False  # an unstable state, and has not moved yet
+        self._again = 0.0  # when a slow motion is examined again
 
     @classmethod
     def applies_to(cls, scene: Scene) -> bool:
@@ -48,11 +67,20 @@ class Steady(Criterion):
         Outcome or None
         """
         if not self._at_rest(history):
+            self._leaves = False
             return None
-        flow = self._scene.flow
-        if flow is None:
-            return Outcome.EQUILIBRIUM
-        return _arrangement(history) if flow.strains and history.line_of_centers else Outcome.STEADY
+        if self._leaves or history.time < self._again:
+            return None
+        if history.examine is not None:
+            rest = history.examine()
+            if not rest.steady:
+                self._again = _LATER * history.time
+                return None
+            if not rest.stable:
+                self._leaves = True
+                self.departure = rest.departure
+                return None
+        return outcome_at_rest(self._scene, history.membranes, history.state)
 
     def _at_rest(self, history: History) -> bool:
         criteria = self._scene.criteria
@@ -68,12 +96,26 @@ class Steady(Criterion):
         return True
 
 
-def _arrangement(history: History) -> Outcome:
-    """Return how a pair lies: side by side, or end to end with long axes along the line of centers."""
-    membranes = history.membranes
-    assert history.line_of_centers
-    points = curve.positions(
-        membranes.tangent_angle(history.state), membranes.center(history.state), membranes.length
-    )
-    along = np.abs(np.cos(curve.inclination(points) - history.line_of_centers.angle)).mean()
+def outcome_at_rest(scene: Scene, membranes: Membranes, state: Array) -> Outcome:
+    """Return the outcome of a run that has come to rest.
+
+    Parameters
+    ----------
+    scene : Scene
+    membranes : Membranes
+        Of the vesicles that are computed.
+    state : (n,)
+
+    Returns
+    -------
+    Outcome
+    """
+    if scene.flow is None:
+        return Outcome.EQUILIBRIUM
+    if not scene.flow.strains or len(scene.vesicles) != 2:
+        return Outcome.STEADY
+    first, second = membranes.curve_center(state)
+    line = np.arctan2(*(second - first)[::-1])
+    points = curve.positions(membranes.tangent_angle(state), membranes.center(state), membranes.length)
+    along = np.abs(np.cos(curve.inclination(points) - line)).mean()
     return Outcome.END_TO_END if along > np.cos(np.pi / 4) else Outcome.BOUND

@@ -23,6 +23,7 @@ RUN_FIELDS = {
     "outcome",
     "failure",
     "time",
+    "perturbations",
     "period",
     "effective_aspect_ratio",
     "inclination_angle",

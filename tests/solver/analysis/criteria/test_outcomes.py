@@ -168,3 +168,28 @@ def test_the_three_outcomes_in_a_trap(rate: float, outcome: Outcome) -> None:
         assert 90 < run.inclination_angle < 180
     else:
         assert run.inclination_angle == pytest.approx(180, abs=1)
+
+
+@pytest.mark.parametrize(("rate", "tilt", "outcome"), [(0.14, 0.0, "separated"), (0.1, 1e-8, "end-to-end")])
+def test_a_pair_does_not_stay_in_an_unstable_state(rate: float, tilt: float, outcome: str) -> None:
+    """On the diverging axis the pair rests, and any perturbation tears it away."""
+    run = simulate(trapped(rate, tilt))
+    assert run.outcome == outcome
+    assert len(run.perturbations) == 1
+
+
+def test_a_perturbation_that_is_there_grows_by_itself() -> None:
+    run = simulate(trapped(0.09, tilt=1e-2))
+    assert run.outcome is Outcome.BOUND
+    assert run.perturbations == ()
+
+
+def test_a_slow_motion_is_no_rest() -> None:
+    scene = Scene(
+        horizon=100.0,
+        vesicles=(Vesicle(center=(-1.5, 0.0)), Vesicle(center=(1.5, 0.0))),
+        adhesion=PowerLaw(hamaker=1e-4, distance=0.4),
+    )
+    run = simulate(scene)
+    assert run.series["state_rate"][-1] < scene.criteria.steady_rate
+    assert run.outcome is Outcome.UNDECIDED
