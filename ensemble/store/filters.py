@@ -79,6 +79,12 @@ def _declared_type(info: FieldInfo) -> Any:
     return Annotated[info.annotation, registries[0]] if registries else info.annotation
 
 
+def _document_name(name: str, annotation: Any) -> str:
+    """Return the name that a field of a dataclass has in documents."""
+    metadata = get_args(annotation)[1:] if get_origin(annotation) is Annotated else ()
+    return next((each.alias for each in metadata if isinstance(each, FieldInfo) and each.alias), name)
+
+
 def _alternatives(annotation: Any) -> Iterator[Any]:
     """Yield the types that a value may have: unions are taken apart, registries looked up, None left out."""
     origin = get_origin(annotation)
@@ -109,9 +115,9 @@ def _members(annotation: Any, segment: str) -> Iterator[tuple[str | int, Any]]:
             if repeated or int(segment) < len(arguments):
                 yield int(segment), arguments[0 if repeated else int(segment)]
     elif is_dataclass(annotation):
-        hints = get_type_hints(annotation)
-        if segment in hints:
-            yield segment, hints[segment]
+        for name, kind in get_type_hints(annotation, include_extras=True).items():
+            if segment == _document_name(name, kind):
+                yield segment, kind
     elif isinstance(annotation, type) and issubclass(annotation, BaseModel):
         if segment in annotation.model_fields:
             yield segment, _declared_type(annotation.model_fields[segment])

@@ -38,7 +38,9 @@ class RunSummary(BaseModel):
     """
 
     # Strings keep NaN and infinity, which a failed run may carry, inside the JSON standard.
-    model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="strings")
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", ser_json_inf_nan="strings", serialize_by_alias=True
+    )
 
     key: str
     created: Timestamp

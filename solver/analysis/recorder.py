@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from solver.analysis.contacts import cluster_sizes
 from solver.analysis.diagnostics import measures, state_rate, vesicle_measures
 from solver.analysis.run import Frames, Series, VesicleSeries
-from solver.analysis.spatial_error import shape_tails
+from solver.analysis.spatial_error import shape_rates, shape_tails, spatial_error
 from solver.membrane.geometry import Geometry
 from solver.membrane.resampling import resampled_angle, resampled_state
 from solver.membrane.spectral import resampled
@@ -42,6 +42,8 @@ class Recorder:
         Values of the diagnostics so far by the name of their series.
     spatial_error : float
         The largest so far; see `solver.analysis.run.Errors`.
+    spatial_position_error : float
+        The largest so far; see `solver.analysis.spatial_error.spatial_error`.
     """
 
     def __init__(
@@ -54,7 +56,8 @@ class Recorder:
         self._previous: tuple[float, Array] | None = None
         self._vesicle_samples: dict[str, list[Array]] = {}
         self.samples: dict[str, list[float]] = {}
-        self.spatial_error = 0.0
+        self.spatial_error = self.spatial_position_error = 0.0
+        self._shape_rates = shape_rates(scene)
         self._take_equation(equation)
 
     def continue_with(self, equation: EquationOfMotion) -> None:
@@ -144,18 +147,20 @@ class Recorder:
             change, duration = motion.rate, 1.0
         self._append("state_rate", state_rate(self._membranes, change, duration))
         self._previous = time, state
-        self.spatial_error = max(self.spatial_error, *self._spatial_errors(motion, state))
+        self._assess_resolution(time, state, motion)
         if self._frame_is_due(time):
             self._keep(time, state, motion)
 
-    def _spatial_errors(self, motion: Motion, state: Array) -> list[float]:
-        """Return those of the shapes, across waists, and of adhesion at the smallest gap."""
+    def _assess_resolution(self, time: float, state: Array, motion: Motion) -> None:
+        """Note how well the points resolve the shapes, the waists, and adhesion at the smallest gap."""
         tails, waists = shape_tails(self._membranes, state), waist_error(motion.geometry)
         errors = [float(tails.max()), float(waists.max())]
         adhesion = self._equation.adhesion
         if adhesion and motion.closeness:
             errors.append(adhesion.sum_error(motion.closeness))
-        return errors
+        self.spatial_error = max(self.spatial_error, *errors)
+        of_positions = float(spatial_error(tails, self._shape_rates * time).max())
+        self.spatial_position_error = max(self.spatial_position_error, of_positions)
 
     def _keep(self, time: float, state: Array, motion: Motion) -> None:
         membranes = self._membranes

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 if TYPE_CHECKING:
     from solver.scene import Scene
@@ -75,7 +76,10 @@ LARGEST_SPATIAL = 1e-3
 
 @dataclass(frozen=True)
 class Errors:
-    """Measured error indicators, the worst of the run.  `solver/README.md`, section 13, says what they mean.
+    """Errors of a run, and of its answers.  `solver/README.md`, section 13, says what they mean.
+
+    The first four are the worst of the run.  The others are errors at the end and of answers, None where the
+    run has no such answer or its integrator does not propagate errors, and in old records.
 
     Attributes
     ----------
@@ -89,12 +93,15 @@ class Errors:
         The largest of: the amplitude (radians) of the last third of the tangent angle's spectrum; the
         relative error of the single layer across a vesicle's waist; that of adhesion at the smallest gap.
         Beyond `LARGEST_SPATIAL` the points do not resolve the scene.
+    global_ : float or None
+        Of positions at the end, root mean square; its name in documents is ``global``.
     """
 
     area: float
     closure: float
     temporal: float
     spatial: float
+    global_: Annotated[float | None, Field(alias="global")] = None
 
 
 @dataclass(frozen=True)

@@ -1,69 +1,73 @@
-"""Backward differentiation formulas of variable order 1 to 5, by SciPy.
+"""Backward differentiation formulas of variable order 1 to 5 (Shampine & Reichelt 1997).
 
-Shampine & Reichelt 1997: quasi-constant step size, with the NDF modification; the Jacobian is kept until
-Newton's iteration slows down.
-
-SciPy's `BDF` knows dense and sparse matrices only, a relative tolerance, and a Newton tolerance that follows
-from it.  What is replaced in it is not part of its public interface: `SCIPY_INTERNALS` lists it, and a test
-says which of it has changed in another version of SciPy.
+Quasi-constant step size, with the NDF modification; the Jacobian is kept until Newton's iteration slows down.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, ClassVar, Self
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import BDF
-from scipy.sparse import csc_array
 
+from solver.integrators.backward_differences import (
+    MAX_ORDER,
+    ROWS,
+    differences_of_values,
+    extended,
+    interpolant,
+    newton_weights,
+)
+from solver.integrators.control import root_mean_square
 from solver.integrators.integrator import InitialValueProblem, Integrator, Step, StepFailedError, register
+from solver.integrators.propagated_error import Evaluation, LinearizedStep, PropagatedError
 
 if TYPE_CHECKING:
-    from solver.motion.jacobian import Jacobian
     from solver.scene import Numerics
 
 Array = NDArray[np.float64]
 
-# Attributes of SciPy's `BDF` that are used here and are not documented.
-SCIPY_INTERNALS = (
-    "D",  # backward differences of the state; the second row is the step size times the rate at first
-    "I",  # from which c·J is subtracted
-    "J",  # the last Jacobian
-    "error_const",  # by order; times a change of the state it is the local error
-    "h_abs",  # size of the next step
-    "jac",  # computes J
-    "lu",  # factorizes I − c·J
-    "newton_tol",  # error at which Newton's iteration stops, over the tolerance
-    "order",
-    "rtol",
-    "solve_lu",  # solves with what `lu` returned
-)
+# By order, from 0 (Shampine & Reichelt 1997, section 2).  The formula of order k reads
+# (1 − κ) γ (y − y_predicted) + Σₘ γₘ ∇ᵐy = h f(y), and its local error is (κ γ + 1/(k + 1)) ∇ᵏ⁺¹y.
+_KAPPA = np.array([0.0, -0.1850, -1 / 9, -0.0823, -0.0415, 0.0])
+_GAMMA = np.array([sum(1 / m for m in range(1, k + 1)) for k in range(MAX_ORDER + 1)])
+_ALPHA = (1 - _KAPPA) * _GAMMA
+_ERROR = _KAPPA * _GAMMA + 1 / np.arange(1, MAX_ORDER + 2)
 
-# Newton's iteration stops when its error is this fraction of the step's tolerance.  SciPy's own choice, the
-# root of the tolerance, costs half as many evaluations again at 1e-4, for a period that is no more accurate.
+# Newton's iteration stops when its error is this fraction of the step's tolerance.
 _NEWTON_TOLERANCE = 0.1
+_NEWTON_ITERATIONS = 4
+
+# A slower convergence of it, from one iteration to the next, asks for a new Jacobian before the next step.
+# What the Jacobians cost is saved in iterations.
+_SLOW = 0.1
+
+_SHRINK, _GROW = 0.2, 10.0  # limits of the factor from one step size to the next
 
 
 @dataclass(frozen=True)
-class _ImplicitSystem:
-    """I − duration·J, as SciPy's step writes it: ``I - c * J``, with a number for I and this for J."""
+class _Solution:
+    """What Newton's iteration found.
 
-    jacobian: Jacobian
-    duration: float = 1.0
+    Attributes
+    ----------
+    change : (n,)
+        From the predicted state.
+    remainder : (n,)
+        Estimated error of the change.
+    iterations : int
+    convergence : float
+        Quotient of the last two corrections.
+    last : Evaluation
+    """
 
-    __array_ufunc__: ClassVar[None] = None  # leaves the product with a NumPy number to this class
-
-    def __rmul__(self, factor: float) -> Self:
-        return replace(self, duration=factor)
-
-    def __rsub__(self, identity: float) -> Self:
-        return self
-
-    def solver(self) -> Callable[[Array], Array]:
-        return self.jacobian.solver(self.duration)
+    change: Array
+    remainder: Array
+    iterations: int
+    convergence: float
+    last: Evaluation
 
 
 class BackwardDifferentiation:
@@ -82,22 +86,22 @@ class BackwardDifferentiation:
 
     def __init__(self, problem: InitialValueProblem, tolerance: float) -> None:
         self._equation = problem.equation
-        self.jacobian_evaluations = 0
-        self.factorizations = 0
-        size = len(problem.state)
-        self._bdf = BDF(
-            fun=self._rate_or_nan,
-            t0=problem.start,
-            y0=problem.state,
-            t_bound=problem.end,
-            rtol=100 * np.finfo(float).eps,  # the least that SciPy accepts; set to zero below
-            atol=tolerance,
-            jac=csc_array((size, size)),  # replaced below
-        )
-        self._bdf.rtol = 0.0
-        self._bdf.newton_tol = _NEWTON_TOLERANCE
-        self._bdf.I, self._bdf.J = 0.0, self._linearized(problem.state)
-        self._bdf.jac, self._bdf.lu, self._bdf.solve_lu = self._linearized_or_last, self._factorized, _solved
+        self._tolerance = tolerance
+        self._time, self._end = problem.start, problem.end
+        self._jacobian = problem.equation.jacobian(problem.state)
+        self.jacobian_evaluations, self.factorizations = 1, 0
+        slope = problem.equation.rate(problem.state)
+        acceleration = root_mean_square(self._jacobian @ slope)
+        longest = self._end - self._time
+        self._size = min(np.sqrt(tolerance / acceleration), longest) if acceleration > 0 else longest
+        self._table = np.zeros((ROWS, problem.state.size))
+        self._table[0], self._table[1] = problem.state, self._size * slope
+        self._order = 1
+        self._equal_steps = 0
+        self._slow = False
+        self._solve: Callable[[Array], Array] | None = None
+        error = np.zeros_like(problem.state) if problem.error is None else problem.error
+        self._error = PropagatedError(problem.equation.rate, error) if self._jacobian.exact else None
 
     def step(self) -> Step:
         """Take one step; see `Integrator`.
@@ -106,59 +110,147 @@ class BackwardDifferentiation:
         -------
         Step
         """
-        bdf = self._bdf
-        start, intended, order = bdf.t, bdf.h_abs, bdf.order
-        predictor = self._predictor()
-        with np.errstate(invalid="ignore"):  # a state without a rate is NaN, and its step is rejected
-            bdf.step()
-        if bdf.status == "failed":
-            raise StepFailedError(f"no step size suffices at time {start:g}")
-        if not np.all(np.isfinite(bdf.y)):
+        start, shortened = self._time, False
+        least = 10 * np.spacing(start)
+        if self._size < least:
+            self._rescale(least / self._size)
+        while True:
+            if self._size < least:
+                raise StepFailedError(f"no step size suffices at time {start:g}")
+            end = start + self._size
+            if end > self._end:
+                end = self._end
+                self._rescale((end - start) / self._size)
+            solution = self._solved()
+            if solution is None:
+                self._rescale(0.5)
+                shortened = True
+                continue
+            order = self._order
+            excess = _ERROR[order] * root_mean_square(solution.change) / self._tolerance
+            safety = 0.9 * (2 * _NEWTON_ITERATIONS + 1) / (2 * _NEWTON_ITERATIONS + solution.iterations)
+            if excess <= 1:
+                break
+            self._rescale(max(_SHRINK, safety * excess ** (-1 / (order + 1))))
+            shortened = True
+        self._time = end
+        self._accept(solution)
+        self._choose(excess, safety)
+        state = self._table[0].copy()
+        if not np.all(np.isfinite(state)):
             raise StepFailedError("the state is no longer finite")
-        change = bdf.y - predictor(bdf.t)
+        history = self._order, end, self._size
         return Step(
             start=start,
-            end=bdf.t,
-            state=bdf.y,
-            interpolate=bdf.dense_output(),
-            local_error=float(bdf.error_const[order] * np.sqrt(np.mean(change**2))),
-            shortened=bool(bdf.t - start < 0.999 * min(intended, bdf.t_bound - start)),
+            end=end,
+            state=state,
+            interpolate=interpolant(self._table, *history),
+            local_error=float(excess * self._tolerance),
+            shortened=shortened,
+            error=self._error.interpolant(*history) if self._error else None,
         )
 
-    def _predictor(self) -> Callable[[float], Array]:
-        """Return what the formula extrapolates: the last step's interpolant, at first a straight line."""
-        if self._bdf.t_old is not None:
-            predictor: Callable[[float], Array] = self._bdf.dense_output()
-            return predictor
-        start, state, slope = self._bdf.t, self._bdf.y, self._bdf.D[1] / self._bdf.h_abs
-        return lambda time: state + (time - start) * slope
+    def _solved(self) -> _Solution | None:
+        """Return the solution of the formula; if the last Jacobian is too old for it, by a new one."""
+        renewed = self._slow and self._renew()
+        solution = self._newton(self._linearized())
+        if solution is None and not renewed and self._renew():
+            solution = self._newton(self._linearized())
+        self._slow = solution is not None and solution.convergence > _SLOW
+        return solution
 
-    def _rate_or_nan(self, _: float, state: Array) -> Array:
-        """Return the rate; NaN where it does not exist, so that SciPy tries a smaller step."""
+    def _renew(self) -> bool:
+        """Compute the Jacobian where the step is expected to end, and return whether there is one."""
         try:
-            return self._equation.rate(state)
+            self._jacobian = self._equation.jacobian(self._predicted())
         except ArithmeticError:
-            return np.full_like(state, np.nan)
-
-    def _linearized(self, state: Array) -> _ImplicitSystem:
+            return False
         self.jacobian_evaluations += 1
-        return _ImplicitSystem(self._equation.jacobian(state))
+        self._solve = None
+        return True
 
-    def _linearized_or_last(self, _: float, state: Array) -> _ImplicitSystem:
-        """Return the Jacobian; the last one where it does not exist, for a step that will be rejected."""
+    def _predicted(self) -> Array:
+        return np.asarray(self._table[: self._order + 1].sum(axis=0))
+
+    def _linearized(self) -> LinearizedStep:
+        """Return the formula of the present order and step size."""
+        order = self._order
+        duration = self._size / _ALPHA[order]
+        if self._solve is None:
+            self._solve = self._jacobian.solver(duration)
+            self.factorizations += 1
+        weights = _GAMMA[1 : order + 1] / _ALPHA[order]
+        return LinearizedStep(order, weights, duration, self._jacobian, self._solve)
+
+    def _newton(self, step: LinearizedStep) -> _Solution | None:
+        """Return the solution of the formula, None if the iteration does not converge."""
+        predicted, history = self._predicted(), step.weights @ self._table[1 : step.order + 1]
+        change, last_size = np.zeros_like(predicted), np.inf
+        for iteration in range(_NEWTON_ITERATIONS):
+            evaluation = self._evaluated(predicted + change)
+            if evaluation is None:
+                return None
+            correction = step.solve(step.duration * evaluation.rate - history - change)
+            size = root_mean_square(correction) / self._tolerance
+            quotient, last_size = size / last_size, size
+            change = change + correction
+            if iteration == 0 and size > 0:
+                continue
+            left = _NEWTON_ITERATIONS - iteration
+            if quotient >= 1 or quotient**left / (1 - quotient) * size > _NEWTON_TOLERANCE:
+                return None
+            remaining = quotient / (1 - quotient)
+            if remaining * size < _NEWTON_TOLERANCE:
+                return _Solution(change, -remaining * correction, iteration + 1, quotient, evaluation)
+        return None
+
+    def _evaluated(self, state: Array) -> Evaluation | None:
+        """Return the rate in a state, None where it does not exist."""
         try:
-            return self._linearized(state)
+            rate = self._equation.rate(state)
         except ArithmeticError:
-            last: _ImplicitSystem = self._bdf.J
-            return last
+            return None
+        return Evaluation(state, rate) if np.all(np.isfinite(rate)) else None
 
-    def _factorized(self, system: _ImplicitSystem) -> Callable[[Array], Array]:
-        self.factorizations += 1
-        return system.solver()
+    def _accept(self, solution: _Solution) -> None:
+        """Enter the new state, and its error, into the tables."""
+        order, change = self._order, solution.change
+        if self._error:
+            local_error = _ERROR[order] * change
+            if self._equal_steps > 0:  # the next term of its expansion
+                local_error += (change - self._table[order + 1]) / (order + 2)
+            step = self._linearized()
+            self._error.advance(step, local_error / _ALPHA[order], solution.remainder, solution.last)
+        extended(self._table, order, change)
+        self._equal_steps += 1
 
+    def _choose(self, excess: float, safety: float) -> None:
+        """Choose order and size of the next step, once there are enough equal steps to compare."""
+        order, table = self._order, self._table
+        if self._equal_steps < order + 1:
+            return
+        excesses = [np.inf, excess, np.inf]
+        if order > 1:
+            excesses[0] = _ERROR[order - 1] * root_mean_square(table[order]) / self._tolerance
+        if order < MAX_ORDER:
+            excesses[2] = _ERROR[order + 1] * root_mean_square(table[order + 2]) / self._tolerance
+        with np.errstate(divide="ignore"):
+            factors = np.array(excesses) ** (-1 / np.arange(order, order + 3))
+        self._order += int(np.argmax(factors)) - 1
+        self._rescale(min(_GROW, safety * factors.max()))
 
-def _solved(solve: Callable[[Array], Array], right: Array) -> Array:
-    return solve(right)
+    def _rescale(self, factor: float) -> None:
+        """Change the step size by a factor."""
+        order, table = self._order, self._table
+        weights = newton_weights(order, factor)
+        if self._error:
+            self._error.rescale(order, weights, table[order + 1])
+        values = weights[:, :-1] @ table[: order + 1]
+        table[: order + 1] = differences_of_values(order) @ values
+        table[order + 1] *= factor ** (order + 1)
+        self._size *= factor
+        self._equal_steps = 0
+        self._solve = None
 
 
 @register("bdf")

@@ -80,12 +80,15 @@ class InitialValueProblem:
         When the first step begins.
     end : float
         When the last step ends.
+    error : (n,) or None
+        Estimated error of the state; None for an exact one.
     """
 
     equation: DifferentialEquation
     state: Array
     start: float
     end: float
+    error: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -103,6 +106,9 @@ class Step:
         Root mean square of the estimated error that the step added to the state.
     shortened : bool
         Whether a first attempt with a larger step was rejected.
+    error : callable or None
+        From a time in [start, end] to the estimated error of the state there, (n,): what all steps so far
+        have left in it.  None if the integrator does not propagate errors.
     """
 
     start: float
@@ -111,6 +117,7 @@ class Step:
     interpolate: Callable[[float], Array]
     local_error: float
     shortened: bool
+    error: Callable[[float], Array] | None = None
 
     def until(self, time: float) -> Self:
         """Return the part of the step up to a time in it.

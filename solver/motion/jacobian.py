@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,14 @@ class Jacobian(Protocol):
     """The derivative J of a rate by the state, exact or close to it.
 
     Where several ranks share a run, all calls are collective.
+
+    Attributes
+    ----------
+    exact : bool
+        Whether errors of the state can be followed with it; too much is missing from an approximate one.
     """
+
+    exact: ClassVar[bool]
 
     def __matmul__(self, direction: Array) -> Array:
         """Return J times a direction.
@@ -57,6 +64,8 @@ class DenseJacobian:
     ----------
     matrix : (n, n)
     """
+
+    exact: ClassVar[bool] = True
 
     matrix: Array
 
@@ -104,6 +113,8 @@ class BlockDiagonal:
     shares : Shares
         How the parts are shared out among the ranks.
     """
+
+    exact: ClassVar[bool] = False
 
     blocks: Array
     members: NDArray[np.int64]

@@ -13,10 +13,9 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.analysis.spatial_error import shape_tails, spatial_error
+from solver.analysis.spatial_error import shape_rates, shape_tails, spatial_error
 from solver.forces.adhesion import Everywhere
 from solver.membrane.geometry import Geometry, Membranes
-from solver.membrane.symmetry import independent_vesicles
 from solver.motion.equation import accuracy_of
 from solver.potentials.neighbors import Neighbors
 from solver.potentials.proximity import Closeness, waist_error
@@ -139,7 +138,7 @@ class AdaptiveResolution:
     def __init__(self, scene: Scene) -> None:
         numerics = scene.numerics
         self._tolerance = numerics.tolerance
-        self._rate = _rates(scene)
+        self._rate = shape_rates(scene)
         adhesion = scene.adhesion if len(scene.vesicles) > 1 else None
         self._least_distance = 0.0  # between membranes, over the spacing
         self._closest = np.inf  # distance to which adhesion draws the membranes
@@ -199,11 +198,3 @@ class AdaptiveResolution:
         if geometry.membranes.multiplicity > 1:
             return Closeness(geometry).nearest >= self._least_distance
         return Neighbors(geometry, self._least_distance).nearest >= self._least_distance
-
-
-def _rates(scene: Scene) -> Array:
-    """Return how fast bending, adhesion and flow change the shape of each independent vesicle, (M,)."""
-    bending = np.array([v.bending_modulus * (2 * np.pi / v.length) ** 3 for v in independent_vesicles(scene)])
-    adhesion = scene.adhesion.hamaker if scene.adhesion else 0.0
-    flow = scene.flow.rate if scene.flow else 0.0
-    return bending + adhesion + flow

@@ -59,7 +59,7 @@ class Segment:
         """What stays the same in this part."""
         return self.equation.membranes
 
-    def begin(self, time: float, state: Array, latest: float) -> None:
+    def begin(self, time: float, state: Array, latest: float, error: Array | None) -> None:
         """Make the integrator for the steps from a state on.
 
         Parameters
@@ -69,8 +69,10 @@ class Segment:
             At this time.
         latest : float
             When the last step ends.
+        error : (state_size,) or None
+            Estimated error of the state; None for an exact one.
         """
-        problem = InitialValueProblem(self.equation, state, time, latest)
+        problem = InitialValueProblem(self.equation, state, time, latest, error)
         self._integrator = integrator_for(problem, self._scene.numerics, len(self._scene.vesicles))
 
     def step(self) -> Step:

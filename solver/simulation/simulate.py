@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from solver.analysis import averages
 from solver.analysis.run import LARGEST_SPATIAL, Energy, Errors, Outcome, Run, Work
+from solver.analysis.state_error import position_error
 from solver.forces.tension import TensionNotFoundError
 from solver.integrators import StepFailedError
 from solver.membrane.geometry import Membranes
@@ -160,6 +161,14 @@ def _failure(loop: TimeLoop, error: Exception) -> str:
     return str(error)
 
 
+def _global_error(loop: TimeLoop) -> float | None:
+    """Return the error of positions at the end, in time and in space together."""
+    if loop.error is None:
+        return None
+    temporal = position_error(loop.segment.membranes, loop.state, loop.error)
+    return float(np.hypot(temporal, loop.recorder.spatial_position_error))
+
+
 def _finished(
     scene: Scene, loop: TimeLoop, failure: str | None, evaluations_before: int, wall_seconds: float
 ) -> Run:
@@ -187,6 +196,7 @@ def _finished(
             closure=float(series["closure_error"].max()),
             temporal=loop.temporal_error,
             spatial=loop.recorder.spatial_error,
+            global_=_global_error(loop),
         ),
         work=Work(
             steps=loop.steps,

@@ -67,6 +67,8 @@ class TimeLoop:
         Sum of the estimated local errors.
     perturbations : list of float
         Times at which the run rested in an unstable state and was perturbed.
+    error : (state_size,) or None
+        Estimated error of the state; None before the first step, and if the integrator does not propagate it.
     """
 
     def __init__(
@@ -102,6 +104,7 @@ class TimeLoop:
         self.smallest_step: float | None = None
         self.temporal_error = 0.0
         self.perturbations: list[float] = []
+        self.error: Array | None = None
 
     @property
     def done(self) -> bool:
@@ -110,7 +113,7 @@ class TimeLoop:
 
     def begin(self) -> None:
         """Prepare the first step."""
-        self.segment.begin(self.time, self.state, self._scene.latest_time)
+        self.segment.begin(self.time, self.state, self._scene.latest_time, self.error)
 
     def advance(self) -> bool:
         """Take one step.
@@ -145,7 +148,11 @@ class TimeLoop:
         """Go on from the start of the step with more points."""
         coarse = self.segment.membranes
         self._take_segment(points)
-        self.state = resampled_state(coarse, self.state, self.segment.membranes)
+        state = resampled_state(coarse, self.state, self.segment.membranes)
+        if self.error is not None:
+            exact = resampled_state(coarse, self.state - self.error, self.segment.membranes)
+            self.error = state - exact
+        self.state = state
         self.rejected_steps += 1
         self.begin()
 
@@ -175,6 +182,7 @@ class TimeLoop:
             step = self.tracker.advance(step)
         self.recorder.record_up_to(step)
         self.time, self.state = step.end, step.state
+        self.error = step.error(step.end) if step.error else None
         self.steps += 1
         self.rejected_steps += step.shortened
         self.temporal_error += step.local_error

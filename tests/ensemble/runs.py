@@ -56,7 +56,7 @@ def shear_run(
         gap=random.uniform(0.2, 0.5),
         viscosity=Viscosity(*random.uniform(0, 2, 3).tolist()),
         energy=Energy(*random.uniform(0, 10, 2).tolist()),
-        error=Errors(*random.uniform(0, 1e-6, 4).tolist()),
+        error=Errors(*random.uniform(0, 1e-6, 5).tolist()),
         work=Work(400, 12, 2000, 60, 80, random.uniform(0.5, 3), random.uniform(1e-6, 1e-2), shape[-1]),
         series={"time": np.arange(samples) * 0.25, **series},
         frames=Frames(

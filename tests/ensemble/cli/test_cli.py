@@ -140,7 +140,7 @@ def test_run_prints_the_documented_fields(stored_run):
     assert document["inclination_angle"] is None, "a doublet has none"
     assert document["viscosity"].keys() == {"total", "bending_tension", "adhesion", "contrast"}
     assert document["energy"].keys() == {"bending", "adhesion"}
-    assert document["error"].keys() == {"area", "closure", "temporal", "spatial"}
+    assert document["error"].keys() == {"area", "closure", "temporal", "spatial", "global"}
     parts = document["viscosity"]["bending_tension"] + document["viscosity"]["adhesion"]
     assert math.isclose(document["viscosity"]["total"], parts)
 

@@ -1,0 +1,102 @@
+"""Tables of backward differences: the history that backward differentiation keeps.
+
+Row m of a table holds ∇ᵐy, the m-th backward difference of values at equal steps.  Rows up to the order k of
+the formula are the polynomial of degree k through the last k + 1 values.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from math import comb
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+MAX_ORDER = 5
+ROWS = MAX_ORDER + 3  # the order may rise by one, for which one difference more is estimated
+
+
+def extended(table: Array, order: int, difference: Array) -> None:
+    """Append a value to a table, in place.
+
+    Parameters
+    ----------
+    table : (ROWS, n)
+    order : int
+        Of the polynomial that was extrapolated to the new value.
+    difference : (n,)
+        Of the new value from the extrapolated one, which is ∇ᵏ⁺¹y.
+    """
+    table[order + 2] = difference - table[order + 1]
+    table[order + 1] = difference
+    for row in reversed(range(order + 1)):
+        table[row] += table[row + 1]
+
+
+def newton_weights(order: int, factor: float) -> Array:
+    """Return the weights of differences in the values at multiples of another step.
+
+    By Newton's formula y(t + s·h) = Σₘ ∇ᵐy s(s + 1)…(s + m − 1)/m!.
+
+    Parameters
+    ----------
+    order : int
+    factor : float
+        Of the new step size to the old one.
+
+    Returns
+    -------
+    (order + 1, order + 2)
+        Row j for the value j new steps back; the last column is the first term that a polynomial of this
+        order leaves out.
+    """
+    steps = -factor * np.arange(order + 1)[:, None]
+    rows = np.arange(order + 1)
+    return np.hstack([np.ones((order + 1, 1)), np.cumprod((steps + rows) / (rows + 1), axis=1)])
+
+
+@cache
+def differences_of_values(order: int) -> Array:
+    """Return the matrix from values, the latest first, to their backward differences.
+
+    Parameters
+    ----------
+    order : int
+
+    Returns
+    -------
+    (order + 1, order + 1)
+    """
+    rows = range(order + 1)
+    return np.array([[float((-1) ** value * comb(row, value)) for value in rows] for row in rows])
+
+
+def interpolant(table: Array, order: int, time: float, size: float) -> Callable[[float], Array]:
+    """Return the polynomial that the rows up to an order stand for.
+
+    Parameters
+    ----------
+    table : (ROWS, n)
+        It may change afterwards.
+    order : int
+    time : float
+        Of the latest value.
+    size : float
+        Of the steps.
+
+    Returns
+    -------
+    callable
+        From a time to the value there, (n,).
+    """
+    kept = table[: order + 1].copy()
+    rows = np.arange(order)
+
+    def value(instant: float) -> Array:
+        weights = np.cumprod(((instant - time) / size + rows) / (rows + 1))
+        return np.asarray(kept[0] + weights @ kept[1:])
+
+    return value

@@ -1,0 +1,93 @@
+"""The error that backward differentiation says it has left in the state."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.linalg import expm
+
+from solver.integrators import InitialValueProblem
+from solver.integrators.bdf import BackwardDifferentiation
+from solver.integrators.control import root_mean_square
+from solver.motion.jacobian import DenseJacobian
+from solver.motion.terms import equation_of_motion
+from solver.scene import Numerics, Scene
+from solver.simulation.initial_state import initial_ellipses
+from tests.solver.scenes import fixed_horizon, shear_pair
+from tests.solver.steps import FunctionEquation, all_steps
+from tests.solver.suspensions import suspension
+
+Array = NDArray[np.float64]
+
+# Growth, a slow rotation with a stiff decay, and a growing rotation that drives a stiff component.
+MATRICES = {
+    "growth": np.array([[1.0]]),
+    "rotation": np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1e3]]),
+    "driven": np.array([[0.3, 2.0, 0.0], [-2.0, 0.3, 0.0], [0.0, 1.0, -100.0]]),
+}
+
+
+@pytest.mark.parametrize("name", MATRICES)
+@pytest.mark.parametrize(("tolerance", "relative"), [(1e-5, 0.3), (1e-7, 0.1)])
+def test_the_error_of_a_linear_equation_is_found(name: str, tolerance: float, relative: float) -> None:
+    """The estimate neglects higher differences only, so it becomes exact as the tolerance falls."""
+    matrix = MATRICES[name]
+    start = np.ones(len(matrix))
+    equation = FunctionEquation(lambda y: matrix @ y, lambda _: matrix)
+    steps = all_steps(
+        BackwardDifferentiation(InitialValueProblem(equation, start, 0.0, 10.0), tolerance), 10.0
+    )
+    for step in steps:
+        if step.end < 5.0:
+            continue
+        assert step.error
+        true = step.state - expm(matrix * step.end) @ start
+        wrong = root_mean_square(step.error(step.end) - true)
+        assert wrong < relative * root_mean_square(true), step.end
+
+
+def test_an_error_of_the_start_is_carried_on() -> None:
+    matrix = MATRICES["driven"]
+    start, error = np.ones(3), np.array([1e-3, 0.0, -2e-3])
+    equation = FunctionEquation(lambda y: matrix @ y, lambda _: matrix)
+    problem = InitialValueProblem(equation, start, 0.0, 5.0, error)
+    step = all_steps(BackwardDifferentiation(problem, 1e-8), 5.0)[-1]
+    assert step.error
+    np.testing.assert_allclose(step.error(5.0), expm(matrix * 5.0) @ error, rtol=0, atol=1e-5)
+
+
+def test_a_jacobian_that_is_wrong_is_seen_through() -> None:
+    """With half the true growth in its Jacobian the error would come out far too small."""
+    equation = FunctionEquation(lambda y: y, lambda _: np.array([[0.5]]))
+    problem = InitialValueProblem(equation, np.ones(1), 0.0, 10.0)
+    step = all_steps(BackwardDifferentiation(problem, 1e-6), 10.0)[-1]
+    assert step.error
+    assert step.error(10.0)[0] == pytest.approx(step.state[0] - np.exp(10.0), rel=0.4)
+
+
+def final(scene: Scene, tolerance: float) -> tuple[Array, Array]:
+    """Return the last state and its error."""
+    equation = equation_of_motion(scene)
+    problem = InitialValueProblem(equation, initial_ellipses(scene), 0.0, scene.horizon)
+    step = all_steps(BackwardDifferentiation(problem, tolerance), scene.horizon)[-1]
+    assert step.error
+    return step.state, step.error(scene.horizon)
+
+
+@pytest.mark.parametrize(("hamaker", "horizon"), [(1.5, 12.0), (0.38, 30.0)])
+def test_the_error_of_a_pair_is_found(hamaker: float, horizon: float) -> None:
+    """Near the critical adhesion strength, 0.36, motion amplifies errors a hundredfold."""
+    scene = shear_pair(hamaker, **fixed_horizon(horizon), numerics=Numerics(points=48))
+    exact, _ = final(scene, 1e-9)
+    for tolerance in (1e-4, 1e-5):
+        state, error = final(scene, tolerance)
+        true = root_mean_square(state - exact)
+        assert true / 3 < root_mean_square(error) < 3 * true
+
+
+def test_an_approximate_jacobian_propagates_nothing() -> None:
+    scene = suspension(7, horizon=0.1)
+    problem = InitialValueProblem(equation_of_motion(scene), initial_ellipses(scene), 0.0, 0.1)
+    assert BackwardDifferentiation(problem, 1e-3).step().error is None
+    assert DenseJacobian.exact
