@@ -34,10 +34,13 @@ def guide(title: str) -> str:
 
 @pytest.fixture
 def printed(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[ModuleType]:
-    """The module that a guide prints, imported from a file."""
+    """The module that a guide prints, imported from a file.
+
+    Its kind is another one, so that the guide's flow may be added to those that there are.
+    """
     name = f"printed_{request.node.name}"
     file = tmp_path / f"{name}.py"
-    file.write_text(guide(request.param))
+    file.write_text(guide(request.param).replace('"poiseuille"', '"printed-poiseuille"'))
     specification = importlib.util.spec_from_file_location(name, file)
     assert specification
     assert specification.loader
@@ -51,7 +54,7 @@ def printed(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[ModuleTy
 @pytest.mark.parametrize("printed", ["Add a flow"], indirect=True)
 def test_a_flow(printed: ModuleType) -> None:
     """A vesicle off the axis of a channel flow drifts toward the axis, and a pair is not halved."""
-    flow = {"kind": "poiseuille", "rate": 1.0, "half_width": 4.0}
+    flow = {"kind": "printed-poiseuille", "rate": 1.0, "half_width": 4.0}
     FLOWS.add(printed.Poiseuille)
     try:
         vesicle = {"reduced_area": 0.9, "center": [0.0, 1.5]}

@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 class Poiseuille(ImposedFlow):
     """Velocity rate·(w − y²/w, 0): fastest at y = 0, so that it is not odd."""
 
-    kind: Literal["poiseuille"] = "poiseuille"
+    kind: Literal["added-poiseuille"] = "added-poiseuille"
     half_width: Positive = 5.0
 
     title = "Poiseuille flow"
@@ -54,7 +54,7 @@ def poiseuille() -> Iterator[None]:
 DOCUMENT = """
     horizon = 3.0
     vesicles = [{ center = [-1.6, 0.4] }, { center = [1.6, -0.4] }]
-    flow = { kind = "poiseuille", rate = 0.2, half_width = 4.0 }
+    flow = { kind = "added-poiseuille", rate = 0.2, half_width = 4.0 }
     criteria = { extensions = 1.0 }
 """
 
@@ -64,7 +64,7 @@ def test_documents_name_it() -> None:
     assert scene.flow == Poiseuille(rate=0.2, half_width=4.0)
     assert Scene.model_validate_json(scene.model_dump_json(), strict=True) == scene
     with pytest.raises(ValidationError, match=r"(?s)flow.half_width.*greater than 0"):
-        Scene.model_validate_json('{"horizon": 1, "flow": {"kind": "poiseuille", "half_width": 0}}')
+        Scene.model_validate_json('{"horizon": 1, "flow": {"kind": "added-poiseuille", "half_width": 0}}')
 
 
 def test_a_pair_that_a_half_turn_leaves_as_it_is_moves_along() -> None:
@@ -97,7 +97,7 @@ def test_the_equation_of_motion_has_its_exact_jacobian() -> None:
 def test_it_is_unknown_once_removed() -> None:
     FLOWS.remove(Poiseuille)
     try:
-        with pytest.raises(ValidationError, match=r"'poiseuille'.*expected tags: 'shear'"):
+        with pytest.raises(ValidationError, match=r"'added-poiseuille'.*expected tags: 'shear'"):
             Scene.model_validate(tomllib.loads(DOCUMENT))
     finally:
         FLOWS.add(Poiseuille)

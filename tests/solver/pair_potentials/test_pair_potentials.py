@@ -52,7 +52,7 @@ def morse(square: float, parameters: tuple[float, float]) -> Derivatives:
 class Morse(PairPotential):
     """φ = H[exp(−2a(r − δ)) − 2 exp(−a(r − δ))] with the steepness a."""
 
-    kind: Literal["morse"] = "morse"
+    kind: Literal["added-morse"] = "added-morse"
     steepness: Positive = 4.0
 
     @property
@@ -67,7 +67,8 @@ class Morse(PairPotential):
 def test_the_guide_adds_this_potential() -> None:
     guide = (Path(__file__).parents[3] / "solver" / "README.md").read_text(encoding="utf-8")
     for part in (morse, Morse):
-        assert textwrap.indent(inspect.getsource(part), "   ") in guide
+        source = inspect.getsource(part).replace("added-morse", "morse")  # which may be registered one day
+        assert textwrap.indent(source, "   ") in guide
 
 
 @pytest.fixture
@@ -148,7 +149,7 @@ def document(scene: Scene, **adhesion: Any) -> Scene:
 )
 @pytest.mark.usefixtures("registered")
 def test_a_new_potential_runs(scene: Scene, cutoff: float | None) -> None:
-    scene = document(scene, kind="morse", steepness=3.0, cutoff=cutoff)
+    scene = document(scene, kind="added-morse", steepness=3.0, cutoff=cutoff)
     assert scene.adhesion == Morse(**COMMON, steepness=3.0, cutoff=cutoff)
     assert Scene.model_validate_json(scene.model_dump_json()) == scene
     run = simulate(scene)
