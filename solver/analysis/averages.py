@@ -48,7 +48,7 @@ def inclination(scene: Scene, series: Series) -> float | None:
     """
     if "inclination_angle" in series:
         return float(np.degrees(series["inclination_angle"][-1]))
-    if scene.flow and scene.flow.strains and "center_angle" in series:
+    if scene.imposed_flow and scene.imposed_flow.strains and "center_angle" in series:
         return float(pair_inclination(series["center_angle"][-1]))
     return None
 

@@ -10,14 +10,18 @@ from numpy.typing import NDArray
 from solver.analysis.contacts import cluster_sizes
 from solver.analysis.diagnostics import measures, state_rate, vesicle_measures
 from solver.analysis.run import Frames, Series, VesicleSeries
-from solver.analysis.spatial_error import shape_rates, shape_tails, spatial_error
+from solver.analysis.spatial_error import shape_tails, spatial_error
 from solver.membrane.geometry import Geometry
 from solver.membrane.resampling import resampled_angle, resampled_state
+from solver.membrane.restoring import shape_rates
 from solver.membrane.spectral import resampled
+from solver.membrane.symmetry import independent_vesicles
 from solver.motion.equation import EquationOfMotion, Motion
 from solver.potentials.proximity import waist_error
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from solver.analysis.line_of_centers import LineOfCenters
     from solver.integrators import Step
     from solver.scene import Scene
@@ -35,6 +39,8 @@ class Recorder:
         Of this scene.
     line_of_centers : LineOfCenters or None
         Of two vesicles.
+    origin : callable or None
+        From a time to where the origin of the states lies in the fluid, (2,); None if it stays at 0.
 
     Attributes
     ----------
@@ -47,17 +53,22 @@ class Recorder:
     """
 
     def __init__(
-        self, scene: Scene, equation: EquationOfMotion, line_of_centers: LineOfCenters | None
+        self,
+        scene: Scene,
+        equation: EquationOfMotion,
+        line_of_centers: LineOfCenters | None,
+        origin: Callable[[float], Array] | None = None,
     ) -> None:
         self._scene = scene
         self._line_of_centers = line_of_centers
+        self._origin = origin
         self._vesicle_measures = vesicle_measures(scene)
         self._frames: list[tuple[float, Array, Array, Array]] = []
         self._previous: tuple[float, Array] | None = None
         self._vesicle_samples: dict[str, list[Array]] = {}
         self.samples: dict[str, list[float]] = {}
         self.spatial_error = self.spatial_position_error = 0.0
-        self._shape_rates = shape_rates(scene)
+        self._shape_rates = shape_rates(independent_vesicles(scene), scene)
         self._take_equation(equation)
 
     def continue_with(self, equation: EquationOfMotion) -> None:
@@ -137,6 +148,9 @@ class Recorder:
             self._append(name, measure(motion))
         for name, measure_each in self._vesicle_measures.items():
             self._vesicle_samples.setdefault(name, []).append(measure_each(motion))
+        if self._origin and "vesicle_center" in self._vesicle_samples:
+            centers = self._vesicle_samples["vesicle_center"]
+            centers[-1] = centers[-1] + self._origin(time)
         if self._line_of_centers:
             self._append("center_distance", self._line_of_centers.distance_of(state))
             self._append("center_angle", self._line_of_centers.angle_of(state))
@@ -165,9 +179,10 @@ class Recorder:
     def _keep(self, time: float, state: Array, motion: Motion) -> None:
         membranes = self._membranes
         tension = np.tile(motion.tension, (membranes.multiplicity, 1))
-        self._frames.append(
-            (time, membranes.curve_tangent_angle(state), membranes.curve_center(state), tension)
-        )
+        centers = membranes.curve_center(state)
+        if self._origin:
+            centers = centers + self._origin(time)
+        self._frames.append((time, membranes.curve_tangent_angle(state), centers, tension))
 
     def _append(self, name: str, value: float) -> None:
         self.samples.setdefault(name, []).append(value)
@@ -219,4 +234,5 @@ def _unknown_motion(geometry: Geometry) -> Motion:
         tension=scalar,
         bending=vector,
         adhesion=vector,
+        restoring=None,
     )

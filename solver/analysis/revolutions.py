@@ -118,7 +118,8 @@ def may_tumble(scene: Scene) -> bool:
     -------
     bool
     """
-    rotates = scene.flow is not None and scene.flow.rotates
+    flow = scene.imposed_flow
+    rotates = flow is not None and flow.rotates
     return len(scene.vesicles) == 1 and rotates and scene.vesicles[0].reduced_area < 1
 
 

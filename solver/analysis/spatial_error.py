@@ -8,11 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.membrane.spectral import tail
-from solver.membrane.symmetry import independent_vesicles
 
 if TYPE_CHECKING:
     from solver.membrane.geometry import Membranes
-    from solver.scene import Scene
 
 Array = NDArray[np.float64]
 
@@ -57,21 +55,3 @@ def spatial_error(tails: Array, age: Array) -> Array:
         In units of length.
     """
     return np.asarray(_STARTING * tails**3 + _PERSISTING * tails**1.5 * np.minimum(age, 1.0))
-
-
-def shape_rates(scene: Scene) -> Array:
-    """Return how fast bending, adhesion and flow change the shape of each independent vesicle.
-
-    Parameters
-    ----------
-    scene : Scene
-
-    Returns
-    -------
-    (M,)
-        Inverse times.
-    """
-    bending = np.array([v.bending_modulus * (2 * np.pi / v.length) ** 3 for v in independent_vesicles(scene)])
-    adhesion = scene.adhesion.hamaker if scene.adhesion else 0.0
-    flow = scene.flow.rate if scene.flow else 0.0
-    return bending + adhesion + flow

@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from solver.flows.imposed_flow import Array, Symbol
+from solver.flows.imposed_flow import Array, ImposedFlow, Symbol
 from solver.flows.linear import LinearFlow
 
 
@@ -20,3 +20,10 @@ class Extension(LinearFlow):
     symbols: ClassVar[Mapping[str, Symbol]] = {"rate": Symbol("extension rate", r"\dot{\epsilon}", "ε̇")}
     strains: ClassVar[bool] = True
     unit_gradient: ClassVar[Array] = np.array([[-1.0, 0.0], [0.0, 1.0]])
+
+    @property
+    def comoving(self) -> ImposedFlow:
+        """A trap: what the flow carries away it carries away as a whole."""
+        from solver.flows.trap import Trap
+
+        return Trap(rate=self.rate)

@@ -109,6 +109,15 @@ class ImposedFlow(Model, ABC):
         return np.einsum("ijp,jps->ips", self.velocity_gradient(points), by_state)
 
     @property
+    def comoving(self) -> ImposedFlow | None:
+        """The flow in the frame of the mean of the vesicles' centers, if they are computed there.
+
+        It has the same gradient everywhere and vanishes at that mean.  A flow that carries vesicles away ever
+        faster states it, as `solver.simulation.moving_frame` says; None for other flows.
+        """
+        return None
+
+    @property
     def shear_rate(self) -> float | None:
         """Shear rate du_x/dy by which a stress is divided to give a viscosity; None for other flows."""
         return None

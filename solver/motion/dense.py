@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from solver.forces.adhesion import DirectAdhesion
     from solver.forces.bending import Bending
     from solver.forces.tension import Inextensibility, TensionInverse
+    from solver.membrane.restoring import Restoring
     from solver.potentials.single_layer import SingleLayer
     from solver.potentials.viscosity_contrast import ViscosityContrast
 
@@ -51,6 +52,8 @@ class DenseEquation:
     layer : SingleLayer
     contrast : ViscosityContrast or None
         None if all viscosities are equal.
+    restoring : Restoring or None
+        None where steps are chosen by the drift of areas.
     evaluations, recordings : int
         See `EquationOfMotion`.
     """
@@ -62,6 +65,7 @@ class DenseEquation:
     inextensibility: Inextensibility
     layer: SingleLayer
     contrast: ViscosityContrast | None = None
+    restoring: Restoring | None = None
     evaluations: int = field(default=0, init=False)
     recordings: int = field(default=0, init=False)
     _inverse: TensionInverse | None = field(default=None, init=False)
@@ -232,8 +236,9 @@ class DenseEquation:
             velocity = self.contrast.velocity(velocity)
         mobility = self.contrast or self.layer
         free, inverse = self.inextensibility.solve(mobility, geometry, velocity, self._inverse)
+        restoring = self.restoring.rate(geometry) if self.restoring else None
         motion = Motion(
-            geometry, closeness, free.velocity, free.rotation_rate, free.tension, bending, adhesion
+            geometry, closeness, free.velocity, free.rotation_rate, free.tension, bending, adhesion, restoring
         )
         return motion, inverse
 
@@ -300,5 +305,7 @@ class DenseEquation:
             result[block, block] += speed[vesicle] * to_curvature
             result[block, block] += np.outer(curvature[vesicle], by_curvature[vesicle] @ to_curvature)
             result[block] -= highest @ (highest.T @ result[block])
+            if self.restoring:
+                result[block, block] += self.restoring.jacobian(geometry, vesicle)
         result[count * points :] = velocity.reshape(2 * count, points, -1).mean(axis=1)
         return result

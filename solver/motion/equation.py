@@ -5,6 +5,9 @@ are the tangent angle θ at the points of each vesicle and the vesicle's center 
 
     θ_t = n · u_s,    c_t = mean(u).
 
+Where steps are not chosen by the drift of areas, a term is added that vanishes on the exact motion and leads
+areas and closures back (`solver.membrane.restoring`).
+
 An equation may keep what its last evaluation found, to make the next one cheaper: an inverse that
 preconditions the search for the tension, or the tension with which that search begins.  Such a memory decides
 the last bits of what is computed.  So only `rate` and `jacobian`, which steps ask for, change it; `motion`,
@@ -70,6 +73,8 @@ class Motion:
         Force per length.
     adhesion : (2, M, N) or None
         Force per length; None for a scene without adhesion.
+    restoring : (M, N) or None
+        What is added to the rates of the tangent angles to restore areas and closures; None where nothing is.
     """
 
     geometry: Geometry
@@ -79,6 +84,7 @@ class Motion:
     tension: Array
     bending: Array
     adhesion: Array | None
+    restoring: Array | None
 
     @property
     def rate(self) -> Array:
@@ -89,6 +95,8 @@ class Motion:
         angle_rate = self.rotation_rate.copy()
         points = angle_rate.shape[1]
         add_tangential_motion(self.geometry.curvature, angle_rate, highest_modes(points))
+        if self.restoring is not None:
+            angle_rate += self.restoring
         return np.concatenate([angle_rate.ravel(), self.velocity.sum(axis=2).ravel() / points])
 
 

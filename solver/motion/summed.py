@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from solver.forces.adhesion import DirectAdhesion
     from solver.forces.bending import Bending
     from solver.forces.coarsened_adhesion import CoarsenedAdhesion
+    from solver.membrane.restoring import Restoring
     from solver.motion.dense import DenseEquation
     from solver.parallel import Parallel, Shares
     from solver.potentials.summed_single_layer import SummedSingleLayer
@@ -58,6 +59,8 @@ class SummedEquation:
         From the number of a vesicle to its `DenseEquation` as if it were alone in the flow.
     contrast : None
         Sums know no other viscosity inside the vesicles.
+    restoring : Restoring or None
+        None where steps are chosen by the drift of areas.
     evaluations, recordings : int
         See `EquationOfMotion`.
     """
@@ -71,6 +74,7 @@ class SummedEquation:
     layer: SummedSingleLayer
     isolated: Callable[[int], DenseEquation]
     contrast: None = field(default=None, init=False)
+    restoring: Restoring | None = None
     evaluations: int = field(default=0, init=False)
     recordings: int = field(default=0, init=False)
     _last: _Evaluation | None = field(default=None, init=False)
@@ -182,8 +186,9 @@ class SummedEquation:
             density = bending + adhesion
         flow = self.flow.velocity(geometry.points, geometry.centers) if self.flow else None
         free = self.inextensibility.solve(self.layer, geometry, preconditioner, density, flow, guess)
+        restoring = self.restoring.rate(geometry) if self.restoring else None
         motion = Motion(
-            geometry, neighbors, free.velocity, free.rotation_rate, free.tension, bending, adhesion
+            geometry, neighbors, free.velocity, free.rotation_rate, free.tension, bending, adhesion, restoring
         )
         return _Evaluation(state, motion, preconditioner)
 
@@ -231,6 +236,7 @@ def _part(motion: Motion, geometry: Geometry, vesicle: int) -> Motion:
         motion.tension[part],
         motion.bending[:, part],
         None if motion.adhesion is None else motion.adhesion[:, part],
+        None if motion.restoring is None else motion.restoring[part],
     )
 
 

@@ -17,6 +17,7 @@ from solver.forces.coarsened_adhesion import adhesion_of_many
 from solver.forces.summed_tension import SummedInextensibility
 from solver.forces.tension import ROUND_OFF, Inextensibility
 from solver.membrane.geometry import Membranes
+from solver.membrane.restoring import Restoring
 from solver.membrane.symmetry import independent_vesicles
 from solver.motion.dense import DenseEquation
 from solver.motion.equation import EquationOfMotion, accuracy_of
@@ -100,6 +101,7 @@ def dense_equation_of(
         inextensibility=Inextensibility(accuracy, 1e-3 * accuracy if several else ROUND_OFF),
         layer=SingleLayer(membranes, accuracy, parallel),
         contrast=ViscosityContrast(contrast, membranes, accuracy) if differ else None,
+        restoring=_restoring(vesicles, scene),
     )
 
 
@@ -141,10 +143,16 @@ def summed_equation(scene: Scene, parallel: Parallel = SERIAL) -> SummedEquation
     if scene.adhesion:
         adhesion = adhesion_of_many(scene.adhesion, accuracy, membranes, parallel)
 
+    restoring = _restoring(scene.vesicles, scene)
+
     def isolated(vesicle: int) -> DenseEquation:
         alone = scene.model_copy(update={"vesicles": (scene.vesicles[vesicle],), "adhesion": None})
-        # The others count as well: what their sums leave over must not be divided by round-off.
-        return replace(dense_equation(alone), inextensibility=Inextensibility(accuracy, 1e-3 * accuracy))
+        return replace(
+            dense_equation(alone),
+            # The others count as well: what their sums leave over must not be divided by round-off.
+            inextensibility=Inextensibility(accuracy, 1e-3 * accuracy),
+            restoring=restoring.of_vesicle(vesicle) if restoring else None,
+        )
 
     return SummedEquation(
         parallel=parallel,
@@ -155,4 +163,10 @@ def summed_equation(scene: Scene, parallel: Parallel = SERIAL) -> SummedEquation
         inextensibility=SummedInextensibility(accuracy),
         layer=SummedSingleLayer(membranes, accuracy, parallel),
         isolated=isolated,
+        restoring=restoring,
     )
+
+
+def _restoring(vesicles: tuple[Vesicle, ...], scene: Scene) -> Restoring | None:
+    """Return what restores areas and closures; nothing may where their drift is what chooses the steps."""
+    return None if scene.numerics.step_control == "area-length" else Restoring.of_some(vesicles, scene)

@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from solver.model import Model
+from solver.model import Model, Positive
 from solver.registry import RegisteredNames
 
 # "auto", and the names that the modules of `solver.integrators` register.
@@ -31,14 +31,18 @@ class Numerics(Model):
         the run (Quaife & Biros 2016).
     work_limit : int
         Evaluations of the equation of motion after which a run is given up.
+    wall_limit : float or None
+        Seconds of wall-clock time after which a run is given up, measured after every step; None for none.
+        It depends on the machine whether a run reaches it.  A run that does not is not changed by it.
     """
 
     points: Annotated[int, Field(ge=16, le=1024, multiple_of=2)] | Literal["auto"] = 64
-    tolerance: float = Field(1e-4, ge=1e-12, le=0.1)
+    tolerance: float = Field(1e-4, ge=1e-12, le=0.01)
     integrator: Annotated[str, INTEGRATORS] = "auto"
     order: int | None = Field(None, ge=2, le=8)
     step_control: Literal["embedded", "area-length"] = "embedded"
     work_limit: int = Field(1_000_000, ge=1)
+    wall_limit: Positive | None = None
 
     @model_validator(mode="after")
     def _options_of_the_integrator(self) -> Self:

@@ -10,7 +10,7 @@ from typing import Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from solver.flows import Flow
+from solver.flows import Flow, ImposedFlow
 from solver.model import Model, Positive
 from solver.pair_potentials import Adhesion
 from solver.scene.arrangement import Arrangement
@@ -23,6 +23,9 @@ from solver.scene.vesicle import Vesicle
 
 # Vesicles up to which matrices over all points are kept.  Beyond, sums are faster (measured).
 LARGEST_DENSE = 6
+
+# Samples, or frames, of a run: each costs an evaluation, which no work limit counts.
+MOST_RECORDS = 1_000_000
 
 
 class Scene(Model):
@@ -102,10 +105,26 @@ class Scene(Model):
         """Whether sums are used instead of matrices over all points; they support no viscosity contrast."""
         return len(self.vesicles) > LARGEST_DENSE and all(v.viscosity_contrast == 1 for v in self.vesicles)
 
+    @model_validator(mode="after")
+    def _records_that_can_be_held(self) -> Self:
+        for name, interval in self.output:
+            if self.latest_time > MOST_RECORDS * interval:
+                raise ValueError(
+                    f"output.{name} must be at least {self.latest_time / MOST_RECORDS:g}, a millionth of the "
+                    f"time that the run may last, got {interval:g}"
+                )
+        return self
+
+    @property
+    def imposed_flow(self) -> ImposedFlow | None:
+        """The flow, None in a quiescent fluid: one without, or with a flow of rate 0."""
+        return self.flow if self.flow and self.flow.rate > 0 else None
+
     @property
     def latest_time(self) -> float:
         """When a run ends at the latest; an undecided pair may run on beyond the horizon."""
-        extended = len(self.vesicles) == 2 and self.flow is not None and self.flow.extends_pairs
+        flow = self.imposed_flow
+        extended = len(self.vesicles) == 2 and flow is not None and flow.extends_pairs
         return self.horizon * (self.criteria.extensions if extended else 1.0)
 
     @model_validator(mode="after")

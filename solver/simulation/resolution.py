@@ -13,9 +13,11 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.analysis.spatial_error import shape_rates, shape_tails, spatial_error
+from solver.analysis.spatial_error import shape_tails, spatial_error
 from solver.forces.adhesion import Everywhere
 from solver.membrane.geometry import Geometry, Membranes
+from solver.membrane.restoring import shape_rates
+from solver.membrane.symmetry import independent_vesicles
 from solver.motion.equation import accuracy_of
 from solver.potentials.neighbors import Neighbors
 from solver.potentials.proximity import Closeness, waist_error
@@ -138,7 +140,7 @@ class AdaptiveResolution:
     def __init__(self, scene: Scene) -> None:
         numerics = scene.numerics
         self._tolerance = numerics.tolerance
-        self._rate = shape_rates(scene)
+        self._rate = shape_rates(independent_vesicles(scene), scene)
         adhesion = scene.adhesion if len(scene.vesicles) > 1 else None
         self._least_distance = 0.0  # between membranes, over the spacing
         self._closest = np.inf  # distance to which adhesion draws the membranes

@@ -21,6 +21,7 @@ from solver.motion.terms import accurate_equation, equation_of_motion
 from solver.parallel import SERIAL, Parallel, first_rank_asks
 from solver.simulation.blas_threads import one_blas_thread
 from solver.simulation.initial_state import initial_ellipses, rotated_state
+from solver.simulation.moving_frame import MovingFrame
 from solver.simulation.resolution import UnresolvedError, resolution_of, with_points
 from solver.simulation.time_loop import TimeLoop
 from solver.steady_states.rest import HiddenInstabilityError, rest_near
@@ -82,12 +83,18 @@ def simulate(
     """
     with one_blas_thread():
         began = clock.perf_counter()
-        resolution = resolution_of(scene)
-        start = _start(scene, resolution.points, parallel, should_stop)
+        frame = MovingFrame.of_scene(scene)
+        within = frame.scene if frame else scene
+        resolution = resolution_of(within)
+        start = _start(within, resolution.points, parallel, should_stop)
         should_stop = first_rank_asks(parallel, should_stop)
+        limit = scene.numerics.wall_limit
+        out_of_time = limit and first_rank_asks(parallel, lambda: clock.perf_counter() - began > limit)
         equation_of = partial(equation_of_motion, parallel=parallel)
-        examine = None if scene.many else partial(_examined, scene)
-        loop = TimeLoop(scene, start.points, start.state, resolution, equation_of, parallel, examine)
+        examine = None if scene.many else partial(_examined, within)
+        loop = TimeLoop(
+            within, start.points, start.state, resolution, equation_of, parallel, frame, examine=examine
+        )
         failure = None
         try:
             loop.recorder.record(loop.time, loop.state)
@@ -99,6 +106,8 @@ def simulate(
                     continue
                 if should_stop and should_stop():
                     raise Cancelled
+                if out_of_time and out_of_time():
+                    raise StepFailedError(f"the wall limit of {limit:g} s is reached at time {loop.time:g}")
                 if on_progress:
                     on_progress(loop.time, scene.latest_time)
             loop.recorder.finish(loop.time, loop.state)
@@ -174,7 +183,8 @@ def _finished(
 ) -> Run:
     outcome = loop.outcome if failure is None else Outcome.FAILED
     series = loop.recorder.series
-    rotates = scene.flow is not None and scene.flow.rotates
+    flow = scene.imposed_flow
+    rotates = flow is not None and flow.rotates
     period = loop.tracker.period if loop.tracker and rotates else None
     done = loop.segment.work
     return Run(
@@ -183,7 +193,7 @@ def _finished(
         failure=failure,
         time=loop.time,
         period=period,
-        effective_aspect_ratio=scene.flow.effective_aspect_ratio(period) if scene.flow and period else None,
+        effective_aspect_ratio=flow.effective_aspect_ratio(period) if flow and period else None,
         inclination_angle=averages.inclination(scene, series),
         gap=float(series["gap"][-1]) if "gap" in series else None,
         viscosity=averages.viscosity(scene, series, outcome, loop.tracker),

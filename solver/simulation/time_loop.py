@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from solver.membrane.geometry import Membranes
     from solver.motion.equation import EquationOfMotion
     from solver.scene import Scene
+    from solver.simulation.moving_frame import MovingFrame
     from solver.steady_states.rest import Rest
 
 Array = NDArray[np.float64]
@@ -45,6 +46,8 @@ class TimeLoop:
         From a scene whose number of points is given to its `EquationOfMotion`.
     parallel : Parallel
         The ranks that compute the run together.
+    frame : MovingFrame or None
+        In which the scene is given; None for one that is at rest.
     examine : callable or None
         From membranes and a state that hardly changes to what is behind it (`History`).
 
@@ -79,12 +82,14 @@ class TimeLoop:
         resolution: Resolution,
         equation_of: Callable[[Scene], EquationOfMotion],
         parallel: Parallel,
+        frame: MovingFrame | None = None,
         examine: Callable[[Membranes, Array], Rest] | None = None,
     ) -> None:
         self._scene = scene
         self._resolution = resolution
         self._equation_of = equation_of
         self._parallel = parallel
+        self._frame = frame
         self._examine = examine
         self._criteria = criteria_for(scene)
         self.time = 0.0
@@ -99,7 +104,9 @@ class TimeLoop:
         )
         self._long_axis = LongAxisTracker(membranes, state) if may_tumble(scene) else None
         self.tracker: RevolutionTracker | None = self._line_of_centers or self._long_axis
-        self.recorder = Recorder(scene, self.segment.equation, self._line_of_centers)
+        self.recorder = Recorder(
+            scene, self.segment.equation, self._line_of_centers, frame.origin if frame else None
+        )
         self.steps = self.rejected_steps = 0
         self.smallest_step: float | None = None
         self.temporal_error = 0.0
@@ -180,6 +187,8 @@ class TimeLoop:
             self.smallest_step = min(self.smallest_step or duration, duration)
         if self.tracker:
             step = self.tracker.advance(step)
+        if self._frame:
+            self._frame.follow(step, self.segment.membranes)
         self.recorder.record_up_to(step)
         self.time, self.state = step.end, step.state
         self.error = step.error(step.end) if step.error else None

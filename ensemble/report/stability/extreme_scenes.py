@@ -176,7 +176,7 @@ EXTREME_SCENES: Mapping[str, Mapping[str, Scene]] = MappingProxyType(
             "N 32, reduced area 0.4, shear": _pair(reduced_area=0.4, points=32, flow=_SHEAR),
             "N 256, shear": _pair(points=256, flow=_SHEAR),
             "N 512, shear": _pair(points=512, flow=_SHEAR, horizon=5.0),
-            "tolerance 0.1, shear": _pair(tolerance=0.1, flow=_SHEAR),
+            "tolerance 0.01, shear": _pair(tolerance=0.01, flow=_SHEAR),
             "tolerance 1e-10, shear": _pair(tolerance=1e-10, flow=_SHEAR),
         },
         "long runs": {

@@ -40,7 +40,8 @@ class Revolved(Criterion):
         -------
         bool
         """
-        return len(scene.vesicles) == 2 and scene.flow is not None and scene.flow.rotates
+        flow = scene.imposed_flow
+        return len(scene.vesicles) == 2 and flow is not None and flow.rotates
 
     def decide(self, history: History) -> Outcome | None:
         """Return `Outcome.BOUND` at the first half turn after which the gap has not grown.

@@ -110,9 +110,10 @@ def outcome_at_rest(scene: Scene, membranes: Membranes, state: Array) -> Outcome
     -------
     Outcome
     """
-    if scene.flow is None:
+    flow = scene.imposed_flow
+    if flow is None:
         return Outcome.EQUILIBRIUM
-    if not scene.flow.strains or len(scene.vesicles) != 2:
+    if not flow.strains or len(scene.vesicles) != 2:
         return Outcome.STEADY
     first, second = membranes.curve_center(state)
     line = np.arctan2(*(second - first)[::-1])
