@@ -2,7 +2,7 @@
 
 A curve of length L has the tangent angle θ at N points that are equispaced in arclength.  Its points are the
 center plus the antiderivative of mean zero of (cos θ, sin θ).  The length is exact by construction.  Area and
-closure are conserved only as accurately as the motion is computed, so their drifts measure the error.
+closure are conserved only as accurately as the motion is computed (`solver.membrane.restoring`).
 Curves run counterclockwise; the normal (−sin θ, cos θ) points inward.
 """
 

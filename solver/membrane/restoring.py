@@ -8,7 +8,7 @@ tangent angles changes them by ⟨γ δθ⟩, ⟨·⟩ being the mean over the m
 
     γ = (2 t · ξ, −sin θ, cos θ),    θ_t = … − β γᵀ Γ⁻¹ g,    Γ = ⟨γ γᵀ⟩.
 
-Of all changes of the tangent angles with which g decays like exp(−βt) this is the least one (README, S7a).
+Of all changes of the tangent angles with which g decays like exp(−βt) this is the least one (README, S6a).
 It vanishes on the exact motion.  A circle has no gradient of the area: there the term of the area fades.
 
 The strength β is the rate at which forces and flow change shapes.  Measured on doublets and single vesicles,
@@ -24,12 +24,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.compilation import compiled
-from solver.membrane.geometry import Geometry
 from solver.membrane.spectral import highest_modes, integration
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from solver.membrane.geometry import Geometry
     from solver.scene import Scene, Vesicle
 
 Array = NDArray[np.float64]
@@ -105,7 +105,7 @@ def _deviations(tangents: Array, offsets: Array, reduced_area: float) -> Array:
 @compiled
 def _rate(tangents: Array, offsets: Array, reduced_area: Array, strength: Array, held: Array) -> Array:
     """Return the term for all membranes, (M, N)."""
-    rate = np.empty(tangents.shape[1:])
+    rate = np.empty((tangents.shape[1], tangents.shape[2]))
     for vesicle in range(rate.shape[0]):
         own, about = tangents[:, vesicle].copy(), offsets[:, vesicle].copy()
         gradients, products = _gradients(own, about, held)

@@ -5,7 +5,7 @@ run computes them in a frame about that mean, where they stay near the origin, a
 
     X' = A X + v,    X(t) = exp(At) X(0) + ∫₀ᵗ exp(A(t − s)) v(s) ds,
 
-with the velocity v of the mean in the frame (README, S14a).  Without the frame a pair near a stagnation point
+with the velocity v of the mean in the frame (README, S11a).  Without the frame a pair near a stagnation point
 loses its digits exponentially: in extension at the rate ε its distance from there grows like exp(εt), and so
 does every error of its place.
 """
