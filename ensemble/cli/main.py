@@ -12,7 +12,7 @@ from typing import Annotated
 
 import typer
 
-from ensemble.cli import question_commands, report_commands, schema_command, store_commands
+from ensemble.cli import preset_command, question_commands, report_commands, schema_command, store_commands
 from ensemble.errors import BadInput, EnsembleError
 from ensemble.mpi.world import only_first_rank_speaks, pin_threads
 
@@ -27,6 +27,7 @@ for _command in (
     *question_commands.COMMANDS,
     *store_commands.COMMANDS,
     report_commands.report,
+    preset_command.presets,
     schema_command.schema,
 ):
     app.command()(_command)

@@ -16,14 +16,15 @@ class ProgressFormat(StrEnum):
     JSON = "json"
 
 
-def _preset_names() -> list[str]:
+def preset_names_for_completion() -> list[str]:
+    """Return the names of the presets, for the completion of shells."""
     from ensemble.config.documents import preset_names
 
     return list(preset_names())
 
 
 Document = Annotated[
-    str, typer.Argument(help="Name of a preset, or a TOML file.", autocompletion=_preset_names)
+    str, typer.Argument(help="Name of a preset, or a TOML file.", autocompletion=preset_names_for_completion)
 ]
 Changes = Annotated[
     list[str],

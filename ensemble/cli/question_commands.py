@@ -45,7 +45,8 @@ def bisect(  # numpydoc ignore=PR01
 def run(  # numpydoc ignore=PR01
     scene: Document,
     changes: Changes = [],  # noqa: B006
-    store: Annotated[Path | None, typer.Option(metavar="DIR", help="Keep the run in this store.")] = None,
+    store: StorePath = DEFAULT_STORE,
+    no_store: Annotated[bool, typer.Option("--no-store", help="Keep nothing.")] = False,
     again: Annotated[
         bool, typer.Option("--again", help="Make the run although the store has it; that one is set aside.")
     ] = False,
@@ -57,9 +58,10 @@ def run(  # numpydoc ignore=PR01
 
     The exit status is 1 if it failed numerically.
     """
-    if again and store is not None:
+    if again and not no_store:
         _set_aside(scene, changes, store)
-    answer_and_print("scene", scene, changes, store, ranks_per_run, progress, as_json)
+    place = None if no_store else store
+    answer_and_print("scene", scene, changes, place, ranks_per_run, progress, as_json)
 
 
 COMMANDS = (bisect, run)
@@ -158,7 +160,7 @@ def _answer(
 
     def prepare() -> tuple[Question[Any], int]:
         with refusing():
-            question = kind.load(name_or_path, dict(map(parse_override, changes)))
+            question = _loaded(kind, name_or_path, dict(map(parse_override, changes)))
             requested = ranks_per_run or ("1" if kind.has_many_runs else str(size))
             ranks = chosen_ranks(requested, question.scene, size)
         return question, ranks
@@ -167,3 +169,20 @@ def _answer(
         question, ranks = on_root(communicator, prepare)
         with kind.progress(Console(stderr=True), for_program) as on_change:
             return question.answer(communicator, store, ranks, on_change)
+
+
+def _loaded(kind: type[Question[Any]], name_or_path: str, changes: dict[str, Any]) -> Question[Any]:
+    """Load a question; if its document is of another kind, name the command for that."""
+    from ensemble.config.documents import read_document
+    from ensemble.questions import kinds
+
+    try:
+        return kind.load(name_or_path, changes)
+    except ValueError:
+        document = read_document(name_or_path)
+        for other in kinds():
+            if other.marker in document and kind.marker not in document:
+                raise ValueError(
+                    f"{name_or_path}: this is a {other.kind}: use ensemble {other.command}"
+                ) from None
+        raise

@@ -53,7 +53,13 @@ def _all_stored(store: Store, collection: str, where: list[str]) -> StoredAnswer
 
 
 def show(  # numpydoc ignore=PR01
-    name: Annotated[str, typer.Argument(metavar="RUN|BOUNDARY", help="Key of either, or a boundary's name.")],
+    name: Annotated[
+        str,
+        typer.Argument(
+            metavar="RUN|BOUNDARY",
+            help="Key of either or the beginning of one, or a boundary's name.",
+        ),
+    ],
     output: Annotated[
         Path | None,
         typer.Option(
@@ -61,12 +67,15 @@ def show(  # numpydoc ignore=PR01
         ),
     ] = None,
     store: StorePath = DEFAULT_STORE,
+    as_json: AsJson = False,
 ) -> None:
     """Print a run or a boundary, or draw it to a file."""
     with refusing(), _existing(store) as opened:
         answer = _stored(opened, name)
         if output is not None:
             answer.draw(output)
+        elif as_json:
+            print_json(answer.json_document())
         else:
             print_table(answer.table())
 
@@ -125,7 +134,7 @@ def merge(  # numpydoc ignore=PR01
 
 
 def export(  # numpydoc ignore=PR01
-    key: Annotated[str, typer.Argument(metavar="RUN", help="Key of the run.")],
+    key: Annotated[str, typer.Argument(metavar="RUN", help="Key of the run or its beginning.")],
     file: Annotated[Path, typer.Argument(metavar="FILE", help="HDF5 file to write.")],
     store: StorePath = DEFAULT_STORE,
 ) -> None:
@@ -133,6 +142,7 @@ def export(  # numpydoc ignore=PR01
     from ensemble.store.hdf5_export import export_run
 
     with refusing(), _existing(store) as opened:
+        key = opened.full_key(key)
         export_run(opened.summary(key), opened.load(key), file)
 
 

@@ -7,12 +7,13 @@ import tomllib
 from collections.abc import Iterable, Mapping
 from functools import cache
 from importlib.resources import files
+from itertools import takewhile
 from pathlib import Path
 from typing import Any, TypeVar
 
 from ensemble.config.overrides import override, parse_override
 from ensemble.config.study import Study
-from ensemble.config.validation import validated
+from ensemble.config.validation import nearest, validated
 from solver.scene import Model, Scene
 
 SomeDocument = TypeVar("SomeDocument", bound=Model)
@@ -42,15 +43,54 @@ def preset_document(name: str) -> dict[str, Any]:
         If there is no such preset.
     """
     if name not in preset_names():
-        raise ValueError(f"{name!r} is not a preset; presets: {', '.join(preset_names())}")
+        raise ValueError(f"{name!r} is not a preset; {_presets_like(name)}")
     return copy.deepcopy(_presets()[name])
+
+
+def preset_text(name: str) -> str:
+    """Return the TOML document of a preset, comments included.
+
+    Parameters
+    ----------
+    name : str
+        Name of the preset.
+
+    Returns
+    -------
+    str
+    """
+    return (files("ensemble") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
+
+
+def preset_description(name: str) -> str:
+    """Return what a preset is: the comment at its head, up to the source.
+
+    Parameters
+    ----------
+    name : str
+        Name of the preset.
+
+    Returns
+    -------
+    str
+        One sentence.
+    """
+    lines = takewhile(lambda line: line.startswith("#"), preset_text(name).splitlines())
+    sentence, _, _ = " ".join(line.lstrip("# ") for line in lines).partition(". ")
+    return sentence
 
 
 @cache
 def _presets() -> dict[str, dict[str, Any]]:
     # They do not change, and the service is asked for them hundreds of times a second.
     presets = (file for file in (files("ensemble") / "presets").iterdir() if file.name.endswith(".toml"))
-    return {Path(file.name).stem: tomllib.loads(file.read_text(encoding="utf-8")) for file in presets}
+    return {Path(file.name).stem: tomllib.loads(preset_text(Path(file.name).stem)) for file in presets}
+
+
+def _presets_like(name: str) -> str:
+    """Return the preset that is meant most likely, and else all of them."""
+    similar = nearest(name, preset_names())
+    return f"did you mean {similar!r}?" if similar else f"presets: {', '.join(preset_names())}"
 
 
 def read_document(name_or_path: str | Path) -> dict[str, Any]:
@@ -75,8 +115,9 @@ def read_document(name_or_path: str | Path) -> dict[str, Any]:
         return preset_document(str(name_or_path))
     path = Path(name_or_path)
     if not path.is_file():
-        presets = ", ".join(preset_names())
-        raise ValueError(f"{str(name_or_path)!r} is neither a file nor a preset; presets: {presets}")
+        raise ValueError(
+            f"{str(name_or_path)!r} is neither a file nor a preset; {_presets_like(str(name_or_path))}"
+        )
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except ValueError as error:

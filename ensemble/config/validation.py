@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import reprlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from difflib import get_close_matches
 from typing import Any, TypeVar, overload
 
 from pydantic import BaseModel, TypeAdapter, ValidationError
@@ -46,7 +47,37 @@ def validated(model: type[BaseModel] | TypeAdapter[Any], document: Mapping[str, 
             return model.validate_python(document)
         return model.model_validate(document)
     except ValidationError as error:
-        raise ValueError(explain(error, document)) from error
+        raise ValueError(explain(error, document) + _suggestions(error, model)) from error
+
+
+def nearest(name: str, names: Iterable[str]) -> str | None:
+    """Return which of some names is spelled most like a mistyped one.
+
+    Parameters
+    ----------
+    name : str
+        That was given.
+    names : iterable of str
+        That exist.
+
+    Returns
+    -------
+    str or None
+        None if no name is similar.
+    """
+    return next(iter(get_close_matches(name, list(names), n=1)), None)
+
+
+def _suggestions(error: ValidationError, model: type[BaseModel] | TypeAdapter[Any]) -> str:
+    """Say which fields are meant most likely where unknown ones are given."""
+    unknown = [str(each["loc"][-1]) for each in error.errors() if each["type"] == "extra_forbidden"]
+    if not unknown:
+        return ""
+    schema = model.json_schema() if isinstance(model, TypeAdapter) else model.model_json_schema()
+    tables = [schema, *schema.get("$defs", {}).values()]
+    names = {name for table in tables for name in table.get("properties", {})}
+    similar = [name for name in (nearest(each, sorted(names)) for each in unknown) if name is not None]
+    return f" (did you mean {' and '.join(map(repr, similar))}?)" if similar else ""
 
 
 def explain(error: ValidationError, document: Mapping[str, Any]) -> str:

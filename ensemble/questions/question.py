@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import shlex
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar
 
+from ensemble.config.defaults import DEFAULT_STORE
 from ensemble.config.documents import load
 from ensemble.config.overrides import override
 from ensemble.config.validation import validated
@@ -29,6 +31,29 @@ if TYPE_CHECKING:
 SomeDocument = TypeVar("SomeDocument", bound=Model)
 
 KEY_DIGITS = 32  # hexadecimal
+
+
+SHORT_KEY = 8  # characters that tell the keys of a store apart, almost always
+
+
+def where_kept(key: str, output: str, store: Path) -> str:
+    """Say where an answer is kept and with which command it is drawn.
+
+    Parameters
+    ----------
+    key : str
+        Of the answer.
+    output : str
+        Name of a file that it can be drawn to.
+    store : Path
+        Directory of the store.
+
+    Returns
+    -------
+    str
+    """
+    option = "" if store == DEFAULT_STORE else f" --store {shlex.quote(str(store))}"
+    return f"kept in {store}; to draw it: ensemble show {key[:SHORT_KEY]} --output {output}{option}"
 
 
 class Answer(ABC):
@@ -55,6 +80,10 @@ class Answer(ABC):
 
 class StoredAnswer(ABC):
     """An answer that a store has, as `ensemble show` presents it."""
+
+    @abstractmethod
+    def json_document(self) -> dict[str, Any]:
+        """Return the whole record of the answer as JSON data."""
 
     @abstractmethod
     def table(self) -> Table:
@@ -337,12 +366,17 @@ class Question(ABC, Generic[SomeDocument]):
         store : Store
             An open store.
         name : str
-            Key of the answer, or a name by which people know it.
+            Key of the answer, as much of it as no other key begins with, or a name by which people know it.
 
         Returns
         -------
         StoredAnswer or None
             None if the store has none of this name.
+
+        Raises
+        ------
+        ValueError
+            If there are several; names them.
         """
         return None
 

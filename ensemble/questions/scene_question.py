@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ensemble.config.run_key import run_key
-from ensemble.questions.question import Answer, Question, StoredAnswer, StoredAnswers
+from ensemble.questions.question import Answer, Question, StoredAnswer, StoredAnswers, where_kept
 from ensemble.questions.size_limits import MOST_VESICLES, limit_vesicles
 from solver.scene import Scene
 
@@ -110,7 +110,7 @@ class SceneQuestion(Question[Scene]):
 
         with nullcontext() if store is None else store_on_ranks(communicator, store) as opened:
             summary = single_run(communicator, self.document, opened, ranks_per_run, on_change)
-        return None if summary is None else _FinishedRun(summary)
+        return None if summary is None else _FinishedRun(summary, store)
 
     @classmethod
     def progress(cls, console: Console, for_program: bool) -> Display:
@@ -157,14 +157,19 @@ class SceneQuestion(Question[Scene]):
         store : Store
             An open store.
         name : str
-            Key of the run.
+            Key of the run, or as much of it as no other key begins with.
 
         Returns
         -------
         StoredAnswer or None
             The run.
         """
-        return _StoredRun(store.summary(name), store) if store.contains(name) else None
+        from ensemble.errors import NotStored
+
+        try:
+            return _StoredRun(store.summary(store.full_key(name)), store)
+        except NotStored:
+            return None
 
     @classmethod
     def all_stored(cls, store: Store, where: Sequence[str]) -> StoredAnswers:
@@ -214,6 +219,7 @@ class _FinishedRun(Answer):
     """A run that has just been made, or that the store had already."""
 
     summary: RunSummary
+    store: Path | None
 
     @property
     def complete(self) -> bool:
@@ -229,6 +235,10 @@ class _FinishedRun(Answer):
 
         return fields_table(run_document(self.summary))
 
+    @property
+    def footer(self) -> str | None:
+        return None if self.store is None else where_kept(self.summary.key, "run.png", self.store)
+
 
 @dataclass(frozen=True)
 class _StoredRun(StoredAnswer):
@@ -237,10 +247,15 @@ class _StoredRun(StoredAnswer):
     summary: RunSummary
     store: Store
 
+    def json_document(self) -> dict[str, Any]:
+        return self.summary.document()
+
     def table(self) -> Table:
+        """Return the results and the cost of the run, and the scene that it is of."""
         from ensemble.display.result_tables import fields_table
 
-        return fields_table(run_document(self.summary))
+        scene = self.summary.scene.model_dump(mode="json", exclude_none=True)
+        return fields_table(run_document(self.summary) | {"scene": scene})
 
     def draw(self, output: Path) -> None:
         """Draw what happened in the run, or its movie."""

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from ensemble.config.certifying_scene import certifying_scene
 from ensemble.config.study import Study
 from ensemble.questions.cost import run_work
-from ensemble.questions.question import Answer, Question, StoredAnswer, StoredAnswers
+from ensemble.questions.question import Answer, Question, StoredAnswer, StoredAnswers, where_kept
 from ensemble.questions.size_limits import (
     MOST_SWEEP_VALUES,
     MOST_VESICLES_SWEPT,
@@ -170,15 +170,25 @@ class StudyQuestion(Question[Study]):
         store : Store
             An open store.
         name : str
-            Key of the study, or its name; of several boundaries of this name the one that changed last.
+            Key of the study, as much of it as no other key begins with, or the name of the study.
 
         Returns
         -------
         StoredAnswer or None
             The boundary.
+
+        Raises
+        ------
+        ValueError
+            If there are several; names their keys.
         """
-        named = [boundary for boundary in store.boundaries() if name in (boundary.study_key, boundary.name)]
-        return _StoredBoundary(named[-1], store) if named else None
+        boundaries = store.boundaries()
+        named = [boundary for boundary in boundaries if boundary.name == name]
+        named = named or [boundary for boundary in boundaries if boundary.study_key.startswith(name)]
+        if len(named) > 1:
+            keys = ", ".join(f"{each.study_key} of {each.updated:%Y-%m-%d %H:%M:%S}" for each in named)
+            raise ValueError(f"{name!r} — {len(named)} boundaries; name one by its key: {keys}")
+        return _StoredBoundary(named[0], store) if named else None
 
     @classmethod
     def all_stored(cls, store: Store, where: Sequence[str]) -> StoredAnswers:
@@ -235,11 +245,12 @@ class _TracedBoundary(Answer):
     @property
     def footer(self) -> str:
         usage = self.result.usage
-        runs = f"{usage.runs} runs in {usage.wall_seconds:.1f} s"
-        if not usage.busy_fractions:
-            return runs
-        mean, least = fmean(usage.busy_fractions), min(usage.busy_fractions)
-        return f"{runs}; ranks busy {mean:.1%} of the time on average, {least:.1%} at least"
+        work = f"{usage.runs} runs in {usage.wall_seconds:.1f} s"
+        if usage.busy_fractions:
+            mean, least = fmean(usage.busy_fractions), min(usage.busy_fractions)
+            work += f"; ranks busy {mean:.1%} of the time on average, {least:.1%} at least"
+        found = StudyQuestion.summary(self.json_document())
+        return f"{work}\n{found}; {where_kept(self.result.boundary.study_key, 'boundary.png', self.store)}"
 
 
 @dataclass(frozen=True)
@@ -248,6 +259,9 @@ class _StoredBoundary(StoredAnswer):
 
     boundary: Boundary
     store: Store
+
+    def json_document(self) -> dict[str, Any]:
+        return self.boundary.model_dump(mode="json")
 
     def table(self) -> Table:
         from ensemble.display.result_tables import boundary_table

@@ -159,6 +159,24 @@ class Catalog:
         with self._engine.connect() as connection:
             return set(connection.scalars(select(RunRow.key)))
 
+    def keys_from(self, beginning: str, limit: int) -> list[str]:
+        """Return keys of runs that begin alike, in ascending order.
+
+        Parameters
+        ----------
+        beginning : str
+            The first characters.
+        limit : int
+            How many keys at most.
+
+        Returns
+        -------
+        list of str
+        """
+        query = select(RunRow.key).where(RunRow.key.startswith(beginning, autoescape=True))
+        with self._engine.connect() as connection:
+            return list(connection.scalars(query.order_by(RunRow.key).limit(limit)))
+
     def run(self, key: str) -> Record | None:
         """Return a run as it was recorded.
 

@@ -32,6 +32,8 @@ from solver.analysis.run import Outcome, Run
 
 COMMIT_SECONDS = 60  # for which a commit is tried again while the database or the disk does not answer
 
+_CANDIDATES = 5  # keys that a message about an ambiguous one names
+
 _log = logging.getLogger(__name__)
 
 
@@ -326,6 +328,32 @@ class Store(AbstractContextManager["Store"]):
         bool
         """
         return self._catalog.run(key) is not None
+
+    def full_key(self, beginning: str) -> str:
+        """Return the key of the only run whose key begins so.
+
+        Parameters
+        ----------
+        beginning : str
+            The first characters of the key, or all of it.
+
+        Returns
+        -------
+        str
+
+        Raises
+        ------
+        NotStored
+            If there is no such run.
+        StoreInputError
+            If there are several; names some of them.
+        """
+        keys = self._catalog.keys_from(beginning, _CANDIDATES) if beginning else []
+        if not keys:
+            raise NotStored(f"run: there is no run {beginning} in {self.path}")
+        if len(keys) > 1:
+            raise StoreInputError(f"run: {beginning} is the beginning of several keys: {', '.join(keys)}")
+        return keys[0]
 
     def outcome(self, key: str) -> Outcome | None:
         """Return the outcome of a committed run.

@@ -14,7 +14,7 @@ from pathlib import Path
 import h5py
 import pytest
 
-from ensemble.config.documents import load_scene
+from ensemble.config.documents import load_scene, load_study, preset_names
 from ensemble.config.run_key import run_key
 
 QUICK_SCENE = ("doublet-shear", "--set=numerics.points=32", "--set=numerics.tolerance=1e-3")
@@ -52,6 +52,8 @@ POINT_FIELDS = {
 
 REFUSED = {
     "unknown key": (["run", "doublet-shear", "--set=nonsense=1"], "nonsense"),
+    "mistyped key": (["run", "doublet-shear", "--set=flow.rte=1"], "did you mean 'rate'?"),
+    "mistyped preset": (["bisect", "critical-hamker"], "did you mean 'critical-hamaker'?"),
     "reduced area 0": (["run", "doublet-shear", "--set=vesicles.reduced_area=0"], "vesicles.0.reduced_area"),
     "reduced area 1.2": (
         ["bisect", "--set=scene.vesicles.reduced_area=1.2"],
@@ -68,7 +70,8 @@ REFUSED = {
     "unknown preset": (["bisect", "no-such-study"], "no-such-study"),
     "unknown scene": (["run", "no-such-scene"], "no-such-scene"),
     "malformed change": (["run", "doublet-shear", "--set=flow.rate"], "flow.rate"),
-    "scene for a study": (["bisect", "doublet-shear"], "search"),
+    "scene for a study": (["bisect", "doublet-shear"], "this is a scene: use ensemble run"),
+    "study for a scene": (["run", "critical-hamaker"], "this is a study: use ensemble bisect"),
 }
 
 
@@ -145,11 +148,42 @@ def test_run_prints_the_documented_fields(stored_run):
     assert math.isclose(document["viscosity"]["total"], parts)
 
 
-def test_run_without_a_store_keeps_nothing_and_repeats_the_same_numbers(ensemble, stored_run, tmp_path):
-    result = ensemble("run", *QUICK_SCENE, "--json", cwd=tmp_path)
+def test_run_with_no_store_keeps_nothing_and_repeats_the_same_numbers(ensemble, stored_run, tmp_path):
+    result = ensemble("run", *QUICK_SCENE, "--no-store", "--json", cwd=tmp_path)
     document, kept = json.loads(result.stdout), stored_run[1]
     assert list(tmp_path.iterdir()) == []
     assert document | {"wall_seconds": None} == kept | {"wall_seconds": None}
+
+
+def test_show_takes_the_beginning_of_a_key_and_prints_the_scene_or_the_record(ensemble, stored_run):
+    store, document = stored_run
+    shown = ensemble("show", document["run_key"][:6], f"--store={store}")
+    assert shown.returncode == 0, shown.stderr
+    fields = dict(line.split("\t") for line in shown.stdout.splitlines())
+    assert fields["run_key"] == document["run_key"]
+    assert fields["scene.flow.kind"] == "shear"
+    record = json.loads(ensemble("show", document["run_key"][:6], f"--store={store}", "--json").stdout)
+    assert record["key"] == document["run_key"]
+    assert record["scene"]["flow"]["kind"] == "shear"
+
+
+def test_a_run_says_where_it_is_kept_and_how_to_draw_it(ensemble, stored_run, tmp_path):
+    store, document = stored_run
+    (*_, last) = ensemble("run", *QUICK_SCENE, f"--store={store}").stdout.splitlines()
+    command = last.partition("to draw it: ")[2].split()
+    assert command[:3] == ["ensemble", "show", document["run_key"][:8]]
+    assert ensemble(*command[1:], cwd=tmp_path).returncode == 0
+    assert (tmp_path / "run.png").stat().st_size > 0
+
+
+def test_the_presets_are_listed_and_each_is_printed_as_its_document(ensemble, tmp_path):
+    rows = [line.split("\t") for line in ensemble("presets").stdout.splitlines()]
+    assert rows[0] == ["preset", "command", "what it is"]
+    assert [row[0] for row in rows[1:]] == list(preset_names())
+    assert all(len(row) == 3 and row[2] for row in rows[1:])
+    copy = tmp_path / "mine.toml"
+    copy.write_text(ensemble("presets", "critical-hamaker").stdout)
+    assert load_study(copy) == load_study("critical-hamaker")
 
 
 def test_a_run_that_the_store_has_is_not_made_again(ensemble, stored_run):
@@ -183,7 +217,7 @@ def test_run_under_a_launcher_is_one_run(launcher):
 def test_run_loads_no_library_it_does_not_need(ensemble):
     script = (
         "import sys\n"
-        f"sys.argv = ['ensemble', 'run', *{QUICK_SCENE!r}, '--json']\n"
+        f"sys.argv = ['ensemble', 'run', *{QUICK_SCENE!r}, '--no-store', '--json']\n"
         "from ensemble.cli.main import main\n"
         "try:\n    main()\n"
         "finally:\n    print(sorted({'zarr', 'mpi4py', 'sqlalchemy', 'matplotlib'} & sys.modules.keys()),"

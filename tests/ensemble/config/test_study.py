@@ -153,9 +153,11 @@ def test_files_are_read_as_presets_are(tmp_path: Path) -> None:
     assert load_scene(str(scene)) == Scene.model_validate({"horizon": 5.0, "vesicles": [{}]})
 
 
-def test_an_unknown_name_is_told_the_presets() -> None:
-    with pytest.raises(ValueError, match="'critical-hamker' is neither") as refused:
+def test_a_mistyped_preset_is_told_the_nearest_one_and_an_unknown_name_all() -> None:
+    with pytest.raises(ValueError, match=r"'critical-hamker' is neither.*did you mean 'critical-hamaker'"):
         load_study("critical-hamker")
+    with pytest.raises(ValueError, match="'tulip' is neither") as refused:
+        load_study("tulip")
     assert all(name in str(refused.value) for name in preset_names())
 
 
