@@ -195,7 +195,7 @@ def test_a_run_that_the_store_has_is_not_made_again(ensemble, stored_run):
 @pytest.mark.parametrize("command", ["run", "bisect"])
 def test_a_program_reads_progress_in_lines_of_json(ensemble, bisect_command, tmp_path, command):
     study = bisect_command(tmp_path / "store")[3:]
-    arguments = study if command == "bisect" else ["run", *QUICK_SCENE, "--json"]
+    arguments = study if command == "bisect" else ["run", *QUICK_SCENE, "--no-store", "--json"]
     result = ensemble(*arguments, "--progress=json")
     assert result.returncode == 0, result.stderr
     json.loads(result.stdout)
@@ -209,7 +209,9 @@ def test_a_program_reads_progress_in_lines_of_json(ensemble, bisect_command, tmp
 def test_run_under_a_launcher_is_one_run(launcher):
     changes = ["numerics.points=32", "horizon=1.0", "criteria.extensions=1.0"]
     options = [f"--set={change}" for change in changes]
-    result = launcher.run(2, [sys.executable, "-m", "ensemble", "run", "doublet-shear", *options, "--json"])
+    result = launcher.run(
+        2, [sys.executable, "-m", "ensemble", "run", "doublet-shear", *options, "--no-store", "--json"]
+    )
     assert result.returncode == 0, result.stderr
     assert json.loads(result.stdout)["run_key"] == run_key(load_scene("doublet-shear", changes))
 
@@ -278,7 +280,7 @@ def test_the_exit_status_tells_that_a_search_did_not_converge(ensemble, tmp_path
 
 def test_a_run_that_fails_at_its_start_is_an_outcome(ensemble, tmp_path):
     slender = ["--set=vesicles.reduced_area=0.03", f"--store={tmp_path / 'store'}"]
-    result = ensemble("run", "vesicle-shear", *slender, "--json")
+    result = ensemble("run", "vesicle-shear", *slender, "--no-store", "--json")
     assert result.returncode == 1, result.stderr
     document = json.loads(result.stdout, parse_constant=pytest.fail)
     assert set(document) == RUN_FIELDS
