@@ -29,6 +29,7 @@ _RESULTS = (
     "failure",
     "time",
     "perturbations",
+    "sensitive",
     "period",
     "effective_aspect_ratio",
     "inclination_angle",

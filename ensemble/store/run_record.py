@@ -58,6 +58,7 @@ class RunSummary(BaseModel):
     energy: Energy
     error: Errors
     work: Work
+    sensitive: bool = False
     series: tuple[str, ...]
     vesicle_series: tuple[str, ...] = ()
     perturbations: tuple[float, ...] = ()

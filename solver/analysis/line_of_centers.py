@@ -37,6 +37,8 @@ class LineOfCenters(RevolutionTracker):
     separated : bool
         Whether the distance has passed the separated distance, or 1.5 times that at the start if that is
         more.
+    separated_distance : float
+        The one that counts.
     """
 
     direction_period = 2 * np.pi
@@ -44,7 +46,7 @@ class LineOfCenters(RevolutionTracker):
     def __init__(self, membranes: Membranes, state: Array, separated_distance: float) -> None:
         super().__init__(membranes, state)
         self.distance = self.distance_of(state)
-        self._separated_distance = max(separated_distance, _FARTHER * self.distance)
+        self.separated_distance = max(separated_distance, _FARTHER * self.distance)
         self.separated = False
 
     def advance(self, step: Step) -> Step:
@@ -59,11 +61,9 @@ class LineOfCenters(RevolutionTracker):
         Step
             The part that was followed.
         """
-        if self.distance_of(step.state) >= self._separated_distance:
+        if self.distance_of(step.state) >= self.separated_distance:
             self.separated = True
-            step = step.until(
-                crossing(step, lambda state: self.distance_of(state) - self._separated_distance)
-            )
+            step = step.until(crossing(step, lambda state: self.distance_of(state) - self.separated_distance))
         step = super().advance(step)
         self.distance = self.distance_of(step.state)
         return step

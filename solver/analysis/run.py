@@ -95,6 +95,13 @@ class Errors:
         Beyond `LARGEST_SPATIAL` the points do not resolve the scene.
     global_ : float or None
         Of positions at the end, root mean square; its name in documents is ``global``.
+    period : float or None
+    inclination_angle : float or None
+        Degrees.
+    viscosity : float or None
+        Of its total.
+    time : float or None
+        Of the time at which a pair came apart.
     """
 
     area: float
@@ -102,6 +109,10 @@ class Errors:
     temporal: float
     spatial: float
     global_: Annotated[float | None, Field(alias="global")] = None
+    period: float | None = None
+    inclination_angle: float | None = None
+    viscosity: float | None = None
+    time: float | None = None
 
 
 @dataclass(frozen=True)
@@ -196,6 +207,9 @@ class Run:
     frames : Frames
     vesicle_series : VesicleSeries
         Diagnostics of each vesicle against time.
+    sensitive : bool
+        Whether the outcome could be another one: a pair would have stayed together or come apart
+        with three times the estimated error.
     perturbations : tuple of float
         Times at which the run rested in an unstable state and was perturbed.
     """
@@ -216,3 +230,4 @@ class Run:
     frames: Frames
     vesicle_series: VesicleSeries = field(default_factory=dict)
     perturbations: tuple[float, ...] = ()
+    sensitive: bool = False

@@ -24,10 +24,10 @@ def extended(table: Array, order: int, difference: Array) -> None:
 
     Parameters
     ----------
-    table : (ROWS, n)
+    table : (ROWS, ...)
     order : int
         Of the polynomial that was extrapolated to the new value.
-    difference : (n,)
+    difference : (...)
         Of the new value from the extrapolated one, which is ∇ᵏ⁺¹y.
     """
     table[order + 2] = difference - table[order + 1]
@@ -79,7 +79,7 @@ def interpolant(table: Array, order: int, time: float, size: float) -> Callable[
 
     Parameters
     ----------
-    table : (ROWS, n)
+    table : (ROWS, ...)
         It may change afterwards.
     order : int
     time : float
@@ -90,13 +90,13 @@ def interpolant(table: Array, order: int, time: float, size: float) -> Callable[
     Returns
     -------
     callable
-        From a time to the value there, (n,).
+        From a time to the value there, (...).
     """
     kept = table[: order + 1].copy()
     rows = np.arange(order)
 
     def value(instant: float) -> Array:
         weights = np.cumprod(((instant - time) / size + rows) / (rows + 1))
-        return np.asarray(kept[0] + weights @ kept[1:])
+        return np.asarray(kept[0] + np.tensordot(weights, kept[1:], 1))
 
     return value

@@ -100,7 +100,7 @@ class BackwardDifferentiation:
         self._equal_steps = 0
         self._slow = False
         self._solve: Callable[[Array], Array] | None = None
-        error = np.zeros_like(problem.state) if problem.error is None else problem.error
+        error = np.zeros((problem.state.size, 2)) if problem.error is None else problem.error
         self._error = PropagatedError(problem.equation.rate, error) if self._jacobian.exact else None
 
     def step(self) -> Step:

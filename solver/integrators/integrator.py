@@ -80,8 +80,8 @@ class InitialValueProblem:
         When the first step begins.
     end : float
         When the last step ends.
-    error : (n,) or None
-        Estimated error of the state; None for an exact one.
+    error : (n, 2) or None
+        Estimated error of the state, and the size that it would usually have (`Step`); None for an exact one.
     """
 
     equation: DifferentialEquation
@@ -107,8 +107,9 @@ class Step:
     shortened : bool
         Whether a first attempt with a larger step was rejected.
     error : callable or None
-        From a time in [start, end] to the estimated error of the state there, (n,): what all steps so far
-        have left in it.  None if the integrator does not propagate errors.
+        From a time in [start, end] to an array (n, 2).  Its first column is the estimated error of the state
+        there: what all steps so far have left in it.  The second one is the same with random signs of the
+        local errors, which do not cancel.  None if the integrator does not propagate errors.
     """
 
     start: float

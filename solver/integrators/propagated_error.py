@@ -7,6 +7,9 @@ steps and the matrix in hand.
 The Jacobian in hand may be several steps old, and then errors grow or die out at another rate than the
 motion's.  So in every third step a difference of two rates shows what it does to the error now, and until
 the next one the Jacobian is taken to be wrong in the direction of that error only.
+
+Local errors of opposite signs may cancel by chance, and then what is wrong with each of them does not.  So
+the same is done for a second error, whose sources have random signs: the size that it would usually have.
 """
 
 from __future__ import annotations
@@ -27,7 +30,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 _PROBED_EVERY = 3  # steps; more often costs more and, measured over eight scenes, gains nothing
-_LEAST_PROBE = 1e-3  # root mean square; smaller differences of rates would be noise
+# Root mean square; differences of rates would be noise if they were smaller, and not linear if larger.
+_LEAST_PROBE, _LARGEST_PROBE = 1e-3, 1e-2
 
 
 @dataclass(frozen=True)
@@ -78,7 +82,7 @@ class _Deviation:
 
     def __matmul__(self, direction: Array) -> Array:
         share = (self.direction @ direction) / (self.direction @ self.direction)
-        return np.asarray(share * self.rate)
+        return np.multiply.outer(self.rate, share)
 
 
 class PropagatedError:
@@ -88,16 +92,17 @@ class PropagatedError:
     ----------
     rate : callable
         From a state (n,) to its rate (n,).
-    error : (n,)
-        Of the state in which the integration begins.
+    error : (n, 2)
+        Of the state in which the integration begins: the estimate, and the one with random signs.
     """
 
     def __init__(self, rate: Callable[[Array], Array], error: Array) -> None:
         self._rate = rate
-        self._table = np.zeros((ROWS, error.size))
+        self._table = np.zeros((ROWS, *error.shape))
         self._table[0] = error
         self._steps = 0
         self._deviation: _Deviation | None = None
+        self._random = np.random.default_rng(0)
 
     def advance(self, step: LinearizedStep, local_error: Array, remainder: Array, near: Evaluation) -> None:
         """Follow one step.
@@ -114,21 +119,27 @@ class PropagatedError:
         """
         table, order = self._table, step.order
         predicted = table[: order + 1].sum(axis=0)
-        history = step.weights @ table[1 : order + 1]
-        change = step.solve(step.duration * (step.jacobian @ predicted) - history + local_error)
+        history = np.tensordot(step.weights, table[1 : order + 1], 1)
+        signs = self._signs()
+        source = local_error[:, None] * signs - history
+        change = step.solve(step.duration * (step.jacobian @ predicted) + source)
         error = predicted + change
         self._steps += 1
         if self._steps % _PROBED_EVERY == 0:
-            self._deviation = self._probe(step.jacobian, error, near)
+            self._deviation = self._probe(step.jacobian, error[:, 0], near)
         if self._deviation and self._deviation.jacobian is step.jacobian:
             change = change + step.solve(step.duration * (self._deviation @ error))
-        extended(table, order, change + remainder)
+        extended(table, order, change + remainder[:, None] * signs)
+
+    def _signs(self) -> Array:
+        """Return the signs of a source, (2,)."""
+        return np.array([1.0, self._random.choice([-1.0, 1.0])])
 
     def _probe(self, jacobian: Jacobian, error: Array, near: Evaluation) -> _Deviation | None:
         size = root_mean_square(error)
         if size == 0:
             return None
-        scale = max(1.0, _LEAST_PROBE / size)
+        scale = min(max(size, _LEAST_PROBE), _LARGEST_PROBE) / size
         try:
             rate = (near.rate - self._rate(near.state - scale * error)) / scale
         except ArithmeticError:
@@ -149,8 +160,9 @@ class PropagatedError:
         left_out : (n,)
             ∇ᵏ⁺¹y of the state, in the old step size.
         """
-        values = weights[:, :-1] @ self._table[: order + 1] - np.outer(weights[:, -1], left_out)
-        self._table[: order + 1] = differences_of_values(order) @ values
+        values = np.tensordot(weights[:, :-1], self._table[: order + 1], 1)
+        values -= weights[:, -1, None, None] * left_out[:, None] * self._signs()
+        self._table[: order + 1] = np.tensordot(differences_of_values(order), values, 1)
 
     def interpolant(self, order: int, time: float, size: float) -> Callable[[float], Array]:
         """Return the error between steps; see `interpolant` of `backward_differences`.

@@ -34,11 +34,11 @@ class Jacobian(Protocol):
 
         Parameters
         ----------
-        direction : (n,)
+        direction : (n,) or (n, k)
 
         Returns
         -------
-        (n,)
+        (n,) or (n, k)
         """
 
     def solver(self, duration: float) -> Callable[[Array], Array]:
@@ -52,7 +52,7 @@ class Jacobian(Protocol):
         Returns
         -------
         callable
-            From a right-hand side b (n,) to the solution x (n,) of (I − duration·J) x = b.
+            From a right-hand side b (n,) or (n, k) to the solution x of (I − duration·J) x = b.
         """
 
 

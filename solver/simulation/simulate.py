@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.analysis import averages
-from solver.analysis.run import LARGEST_SPATIAL, Energy, Errors, Outcome, Run, Work
-from solver.analysis.state_error import position_error
+from solver.analysis.run import LARGEST_SPATIAL, Energy, Outcome, Run, Work
 from solver.forces.tension import TensionNotFoundError
 from solver.integrators import StepFailedError
 from solver.membrane.geometry import Membranes
@@ -23,6 +22,7 @@ from solver.simulation.blas_threads import one_blas_thread
 from solver.simulation.initial_state import initial_ellipses, rotated_state
 from solver.simulation.moving_frame import MovingFrame
 from solver.simulation.resolution import UnresolvedError, resolution_of, with_points
+from solver.simulation.run_errors import errors_of
 from solver.simulation.time_loop import TimeLoop
 from solver.steady_states.rest import HiddenInstabilityError, rest_near
 from solver.steady_states.steady_equations import SteadyEquations
@@ -170,14 +170,6 @@ def _failure(loop: TimeLoop, error: Exception) -> str:
     return str(error)
 
 
-def _global_error(loop: TimeLoop) -> float | None:
-    """Return the error of positions at the end, in time and in space together."""
-    if loop.error is None:
-        return None
-    temporal = position_error(loop.segment.membranes, loop.state, loop.error)
-    return float(np.hypot(temporal, loop.recorder.spatial_position_error))
-
-
 def _finished(
     scene: Scene, loop: TimeLoop, failure: str | None, evaluations_before: int, wall_seconds: float
 ) -> Run:
@@ -201,13 +193,8 @@ def _finished(
             bending=float(series["bending_energy"][-1]),
             adhesion=float(series["adhesion_energy"][-1]) if "adhesion_energy" in series else None,
         ),
-        error=Errors(
-            area=float(series["area_error"].max()),
-            closure=float(series["closure_error"].max()),
-            temporal=loop.temporal_error,
-            spatial=loop.recorder.spatial_error,
-            global_=_global_error(loop),
-        ),
+        error=errors_of(scene, loop, outcome),
+        sensitive=loop.answer_errors.sensitive,
         work=Work(
             steps=loop.steps,
             rejected_steps=loop.rejected_steps,

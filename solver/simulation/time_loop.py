@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.analysis.answer_errors import AnswerErrors
 from solver.analysis.criteria import History, criteria_for
 from solver.analysis.line_of_centers import LineOfCenters
 from solver.analysis.recorder import Recorder
@@ -70,8 +71,10 @@ class TimeLoop:
         Sum of the estimated local errors.
     perturbations : list of float
         Times at which the run rested in an unstable state and was perturbed.
-    error : (state_size,) or None
-        Estimated error of the state; None before the first step, and if the integrator does not propagate it.
+    error : (state_size, 2) or None
+        Estimated error of the state, see `Step`; None before the first step, and if the integrator does not
+        propagate it.
+    answer_errors : AnswerErrors
     """
 
     def __init__(
@@ -112,6 +115,7 @@ class TimeLoop:
         self.temporal_error = 0.0
         self.perturbations: list[float] = []
         self.error: Array | None = None
+        self.answer_errors = AnswerErrors(self.tracker)
 
     @property
     def done(self) -> bool:
@@ -157,8 +161,11 @@ class TimeLoop:
         self._take_segment(points)
         state = resampled_state(coarse, self.state, self.segment.membranes)
         if self.error is not None:
-            exact = resampled_state(coarse, self.state - self.error, self.segment.membranes)
-            self.error = state - exact
+            columns = [
+                state - resampled_state(coarse, self.state - column, self.segment.membranes)
+                for column in self.error.T
+            ]
+            self.error = np.stack(columns, axis=1)
         self.state = state
         self.rejected_steps += 1
         self.begin()
@@ -187,6 +194,7 @@ class TimeLoop:
             self.smallest_step = min(self.smallest_step or duration, duration)
         if self.tracker:
             step = self.tracker.advance(step)
+            self.answer_errors.follow(step)
         if self._frame:
             self._frame.follow(step, self.segment.membranes)
         self.recorder.record_up_to(step)

@@ -96,16 +96,21 @@ function heading({ key, outcome, time, scene, failure }) {
 
 /** @param {any} run */
 function results({ period, gap, inclination_angle, viscosity, energy, error, work }) {
+  /** @type {(value: any, error: any) => string | null} */
+  const withError = (value, error) => {
+    if (value === null || value === undefined) return null;
+    return error === null || error === undefined ? number(value) : `${number(value)} ± ${number(error, 1)}`;
+  };
   const orNull = (/** @type {any} */ value) => (value === null || value === undefined ? null : number(value));
   return element(
     "section",
     { class: "results" },
     element("h2", {}, "Results"),
     definitions([
-      ["Period", orNull(period)],
+      ["Period", withError(period, error.period)],
       ["Gap", orNull(gap)],
-      ["Inclination", inclination_angle === null ? null : `${number(inclination_angle)}°`],
-      ["Viscosity [μ]", orNull(viscosity?.total)],
+      ["Inclination", inclination_angle === null ? null : `${withError(inclination_angle, error.inclination_angle)}°`],
+      ["Viscosity [μ]", withError(viscosity?.total, error.viscosity)],
       ["– bending + tension", orNull(viscosity?.bending_tension)],
       ["– adhesion", orNull(viscosity?.adhesion)],
       ["– viscosity contrast", orNull(viscosity?.contrast)],

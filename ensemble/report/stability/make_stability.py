@@ -133,6 +133,7 @@ def _verdict(runs: TimedRuns, group: str, name: str, scene: Scene) -> SceneVerdi
         area_error=_finite(run.error.area),
         closure_error=_finite(run.error.closure),
         temporal_error=_finite(run.error.temporal),
+        global_error=None if run.error.global_ is None else _finite(run.error.global_),
         spatial_error=_finite(run.error.spatial),
         smallest_gap=_finite(smallest_gap),
         energy_rise=_finite(rise),

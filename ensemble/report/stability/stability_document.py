@@ -57,7 +57,7 @@ class SceneVerdict(ReportModel):
         Why the run failed.
     time, horizon : float or None
         Time that the run reached, and the latest time that it may reach.
-    area_error, closure_error, temporal_error, spatial_error : float or None
+    area_error, closure_error, temporal_error, spatial_error, global_error : float or None
         Errors of the run.
     smallest_gap : float or None
         Smallest recorded distance between two membranes.
@@ -84,6 +84,7 @@ class SceneVerdict(ReportModel):
     area_error: float | None = None
     closure_error: float | None = None
     temporal_error: float | None = None
+    global_error: float | None = None
     spatial_error: float | None = None
     smallest_gap: float | None = None
     energy_rise: float | None = None

@@ -16,6 +16,7 @@ _SCENE_VERDICT = {
     "time": "time",
     "area error": "area_error",
     "closure error": "closure_error",
+    "position error": "global_error",
     "temporal error": "temporal_error",
     "spatial error": "spatial_error",
     "smallest gap": "smallest_gap",

@@ -19,11 +19,14 @@ from ensemble.config.run_key import run_key
 
 QUICK_SCENE = ("doublet-shear", "--set=numerics.points=32", "--set=numerics.tolerance=1e-3")
 # Standard output of one JSON document, null where the scene has no such quantity.
+INDICATORS = {"area", "closure", "temporal", "spatial"}
+ERRORS = INDICATORS | {"global", "period", "inclination_angle", "viscosity", "time"}
 RUN_FIELDS = {
     "outcome",
     "failure",
     "time",
     "perturbations",
+    "sensitive",
     "period",
     "effective_aspect_ratio",
     "inclination_angle",
@@ -143,7 +146,7 @@ def test_run_prints_the_documented_fields(stored_run):
     assert document["inclination_angle"] is None, "a doublet has none"
     assert document["viscosity"].keys() == {"total", "bending_tension", "adhesion", "contrast"}
     assert document["energy"].keys() == {"bending", "adhesion"}
-    assert document["error"].keys() == {"area", "closure", "temporal", "spatial", "global"}
+    assert document["error"].keys() == ERRORS
     parts = document["viscosity"]["bending_tension"] + document["viscosity"]["adhesion"]
     assert math.isclose(document["viscosity"]["total"], parts)
 

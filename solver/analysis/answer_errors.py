@@ -1,0 +1,176 @@
+"""The errors of answers, read off along the trajectory without the estimated error of the state."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.analysis.line_of_centers import LineOfCenters
+from solver.analysis.state_error import magnitude
+from solver.integrators.control import root_mean_square
+
+if TYPE_CHECKING:
+    from solver.analysis.revolutions import RevolutionTracker
+    from solver.integrators import Step
+
+Array = NDArray[np.float64]
+Quantity = Callable[[Array], float]  # of a state
+
+_SAFETY = 3.0  # factor within which an estimated error is trusted
+_SAMPLES = 16  # of a turn; what is averaged over it is smooth
+_FEWEST_SAMPLES = 4
+_LARGEST = 1e-2  # root mean square of the error of a state with which quantities change linearly
+_LARGEST_TRANSVERSE = 0.1  # root mean square; the pair may be on the way to another state
+_PART = 1e-3  # of a step, over which a quantity is taken to change linearly
+
+
+class _Sample(NamedTuple):
+    time: float
+    state: Array
+    error: Array  # (state_size, 2), see `Step`
+
+
+class AnswerErrors:
+    """Follows a run, and compares its answers with those of the trajectory y − e.
+
+    Parameters
+    ----------
+    tracker : RevolutionTracker or None
+        Of the line of centers or the long axis, where one is followed.
+
+    Attributes
+    ----------
+    sensitive : bool
+        Whether a pair would have, or might have, stayed together or come apart with an error three times as
+        large as the estimated one.
+    """
+
+    def __init__(self, tracker: RevolutionTracker | None) -> None:
+        self._tracker = tracker
+        self._at_half_turns: list[Array] = []
+        self._samples: list[_Sample] = []
+        self._separation: Array | None = None
+        self.sensitive = False
+
+    def follow(self, step: Step) -> None:
+        """Take in a step after the tracker has.
+
+        Parameters
+        ----------
+        step : Step
+            The part that was followed.
+        """
+        tracker = self._tracker
+        if tracker is None or step.error is None:
+            return
+        for time in tracker.half_turns[len(self._at_half_turns) :]:
+            self._at_half_turns.append(_time_error(step, time, tracker.angle_of) if time > 0 else np.zeros(2))
+        begin = tracker.half_turns[-3] if len(tracker.half_turns) > 2 else 0.0
+        self._samples = [sample for sample in self._samples if sample.time >= begin]
+        self._samples.append(_Sample(step.end, step.state, step.error(step.end)))
+        if isinstance(tracker, LineOfCenters):
+            self._follow_distance(step, tracker)
+            self.sensitive |= _transverse_error(step) > _LARGEST_TRANSVERSE
+
+    @property
+    def period(self) -> float | None:
+        """That of the duration of the last full turn; None before there is one."""
+        if len(self._at_half_turns) < 3:
+            return None
+        return magnitude(self._at_half_turns[-1] - self._at_half_turns[-3])
+
+    @property
+    def separation(self) -> float | None:
+        """That of the time at which a pair came apart; None as long as it has not."""
+        return None if self._separation is None else magnitude(self._separation)
+
+    def of_average(self, quantity: Quantity) -> float | None:
+        """Return that of the average of a quantity over the last full turn.
+
+        Parameters
+        ----------
+        quantity : callable
+            From a state to a number.
+
+        Returns
+        -------
+        float or None
+            None before there is a full turn, or where the number of points has changed in it.
+        """
+        if self.period is None or self._tracker is None:
+            return None
+        first, last = self._tracker.half_turns[-3], self._tracker.half_turns[-1]
+        size = self._samples[-1].state.size
+        inside = [s for s in self._samples if first <= s.time <= last and s.state.size == size]
+        if len(inside) < _FEWEST_SAMPLES:
+            return None
+        chosen = [inside[k] for k in np.unique(np.linspace(0, len(inside) - 1, _SAMPLES).astype(int))]
+        values = np.array([quantity(s.state) for s in chosen])
+        changes = np.array([change_of(quantity, s.state, s.error) for s in chosen])
+        times = np.array([first, *(s.time for s in chosen), last])
+        duration = last - first
+        # Columns: the value, and its two errors.
+        columns = np.column_stack([values, changes])
+        columns = np.vstack([columns[:1], columns, columns[-1:]])
+        mean, *change = np.trapezoid(columns, times, axis=0) / duration
+        # The turn of the trajectory y − e begins and ends at other times.
+        shifts = (values[-1] - mean) * self._at_half_turns[-1] - (values[0] - mean) * self._at_half_turns[-3]
+        return magnitude(change + shifts / duration)
+
+    def _follow_distance(self, step: Step, line: LineOfCenters) -> None:
+        assert step.error is not None
+        distance, size = line.distance_of, line.distance_of(step.state)
+        change = change_of(distance, step.state, step.error(step.end))
+        if line.separated:
+            self._separation = _time_error(step, step.end, distance)
+            # Would it move apart without the error?
+            before = step.end - _PART * (step.end - step.start)
+            state = step.interpolate(before)
+            difference = change - change_of(distance, state, step.error(before))
+            self.sensitive |= size - distance(state) <= _SAFETY * magnitude(difference)
+        else:
+            self.sensitive |= size + _SAFETY * magnitude(change) >= line.separated_distance
+
+
+def change_of(quantity: Quantity, state: Array, error: Array) -> Array:
+    """Return how much an error of the state changes a quantity, to first order.
+
+    Parameters
+    ----------
+    quantity : callable
+        From a state to a number.
+    state : (state_size,)
+    error : (state_size, 2)
+
+    Returns
+    -------
+    (2,)
+        For each column of the error.
+    """
+    value = quantity(state)
+    changes = []
+    for column in error.T:
+        size = root_mean_square(column)
+        part = min(1.0, _LARGEST / size) if size > 0 else 1.0
+        changes.append((value - quantity(state - part * column)) / part)
+    return np.array(changes)
+
+
+def _time_error(step: Step, time: float, quantity: Quantity) -> Array:
+    """Return how much later than without errors a quantity comes to its value at a time, (2,)."""
+    assert step.error is not None
+    state, later = step.interpolate(time), time + _PART * (step.end - step.start)
+    rate = (quantity(step.interpolate(later)) - quantity(state)) / (later - time)
+    return -change_of(quantity, state, step.error(time)) / rate if rate else np.full(2, np.inf)
+
+
+def _transverse_error(step: Step) -> float:
+    """Return the error at the end of a step without what only delays or hastens the motion."""
+    assert step.error is not None
+    error, motion = step.error(step.end)[:, 0], step.state - step.interpolate(step.start)
+    if np.any(motion):
+        error = error - (error @ motion) / (motion @ motion) * motion
+    return root_mean_square(error)

@@ -1,0 +1,85 @@
+"""The errors of a run that has ended."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.analysis.answer_errors import change_of
+from solver.analysis.averages import pair_inclination
+from solver.analysis.diagnostics import measures
+from solver.analysis.run import Errors, Outcome
+from solver.analysis.state_error import magnitude, position_error
+
+if TYPE_CHECKING:
+    from solver.scene import Scene
+    from solver.simulation.time_loop import TimeLoop
+
+Array = NDArray[np.float64]
+
+
+def errors_of(scene: Scene, loop: TimeLoop, outcome: Outcome) -> Errors:
+    """Return the errors of a run and of its answers.
+
+    Parameters
+    ----------
+    scene : Scene
+    loop : TimeLoop
+        After its last step.
+    outcome : Outcome
+
+    Returns
+    -------
+    Errors
+    """
+    series, recorder = loop.recorder.series, loop.recorder
+    of_answers: dict[str, float | None] = {}
+    if loop.error is not None and outcome is not Outcome.FAILED:
+        temporal = position_error(loop.segment.membranes, loop.state, loop.error)
+        of_answers["global_"] = float(np.hypot(temporal, recorder.spatial_position_error))
+        of_answers["inclination_angle"] = _inclination_error(scene, loop, loop.error)
+        of_answers["viscosity"] = _viscosity_error(scene, loop, loop.error, outcome)
+        if scene.flow and scene.flow.rotates:
+            of_answers["period"] = loop.answer_errors.period
+        of_answers["time"] = loop.answer_errors.separation
+    return Errors(
+        area=float(series["area_error"].max()),
+        closure=float(series["closure_error"].max()),
+        temporal=loop.temporal_error,
+        spatial=recorder.spatial_error,
+        **of_answers,
+    )
+
+
+def _inclination_error(scene: Scene, loop: TimeLoop, error: Array) -> float | None:
+    """Return that of `averages.inclination`, in degrees."""
+    tracker = loop.tracker
+    if tracker is None or scene.flow is None:
+        return None
+    one = len(scene.vesicles) == 1
+    if not one and not scene.flow.strains:
+        return None
+
+    def angle(state: Array) -> float:
+        radians = tracker.angle_of(state)
+        return float(np.degrees(radians) if one else pair_inclination(np.array(radians)))
+
+    return magnitude(change_of(angle, loop.state, error))
+
+
+def _viscosity_error(scene: Scene, loop: TimeLoop, error: Array, outcome: Outcome) -> float | None:
+    """Return that of the total viscosity: of the average over the last turn, or of the steady value."""
+    equation = loop.segment.equation
+    parts = [measure for name, measure in measures(scene, equation).items() if name.startswith("viscosity")]
+    if not parts:
+        return None
+
+    def total(state: Array) -> float:
+        motion = equation.motion(state)
+        return sum(part(motion) for part in parts)
+
+    if outcome is Outcome.STEADY:
+        return magnitude(change_of(total, loop.state, error))
+    return loop.answer_errors.of_average(total)
