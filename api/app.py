@@ -9,10 +9,11 @@ from fastapi import FastAPI
 from prometheus_client import CollectorRegistry
 from pydantic import BaseModel
 from pydantic.json_schema import JsonSchemaMode
+from starlette.middleware.gzip import DEFAULT_EXCLUDED_CONTENT_TYPES, GZipMiddleware
 from starlette.types import Lifespan
 
 from api.http import problems
-from api.http.middleware import BodyLimits, RequestMetrics, SecurityHeaders
+from api.http.middleware import BodyLimits, Pieces, RequestMetrics, SecurityHeaders
 from api.http.openapi import add_models, shorten_descriptions
 from api.jobs.job import NoSuchJob
 from api.jobs.submissions import Submission
@@ -24,6 +25,7 @@ from ensemble.config.run_key import DISTRIBUTION
 from ensemble.store import NotStored
 from ensemble.store.run_record import RunSummary
 
+COMPRESSED_BYTES = 1000  # shorter answers are sent as they are
 # Problems that every route with authentication or parameters may answer with.
 COMMON_PROBLEMS = problems.documented(
     HTTPStatus.BAD_REQUEST,
@@ -88,7 +90,15 @@ def create_app(service: Service, lifespan: Lifespan[FastAPI] | None = None) -> F
     shorten_descriptions(app)
     add_models(app, DESCRIBED_MODELS)
     settings = service.settings
+    # Higher levels compress hardly better and take longer than to send what they save.
+    app.add_middleware(
+        GZipMiddleware,
+        minimum_size=COMPRESSED_BYTES,
+        compresslevel=1,
+        exclude_content_types=(*DEFAULT_EXCLUDED_CONTENT_TYPES, runs.BINARY),
+    )
     app.add_middleware(BodyLimits, maximum_bytes=settings.body_bytes, seconds=settings.body_seconds)
     app.add_middleware(SecurityHeaders)
+    app.add_middleware(Pieces)
     app.add_middleware(RequestMetrics, registry=registry)
     return app

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager
 from functools import cached_property
 from ipaddress import ip_address
+from itertools import count
 from typing import TYPE_CHECKING, Any, Final
 from urllib.request import getproxies, proxy_bypass
 from uuid import uuid4
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
 
 RETRY_SECONDS: Final = 60.0  # time for which requests to a service that cannot be reached are repeated
 TIMEOUT_SECONDS: Final = 30.0  # of one request
+VALUES_AT_ONCE: Final = 500_000  # in one answer; half of the default limit of the service
 
 # Repeating a request is safe: a submission has an idempotency key, so it makes one job.
 _with_retries = retry(
@@ -125,8 +127,22 @@ class StoredRun:
     @cached_property
     def series(self) -> Mapping[str, Array]:
         """Time series of the diagnostics by name, NaN where a value is not finite."""
-        document = self._client.get(f"/runs/{self.summary.key}/series").json()
-        return {name: np.array(values, dtype=float) for name, values in document["series"].items()}
+        names = self.summary.series
+        pieces: dict[str, list[Array]] = {name: [] for name in names}
+        for rows in self._pages("series", max(len(names), 1)):
+            document = rows.json()
+            for name, values in document["series"].items():
+                pieces[name].append(np.array(values, dtype=float))
+            if not names or sum(map(len, pieces[names[0]])) >= document["total"]:
+                break
+        return {name: np.concatenate(arrays) for name, arrays in pieces.items()}
+
+    def _pages(self, part: str, values: int, **options: Any) -> Iterator[httpx.Response]:
+        """Yield consecutive answers about all rows of so many values, without end."""
+        at_once = max(VALUES_AT_ONCE // values, 1)
+        for start in count(step=at_once):
+            rows = {"start": start, "stop": start + at_once}
+            yield self._client.get(f"/runs/{self.summary.key}/{part}", params=rows, **options)
 
     def to_xarray(self) -> xarray.Dataset:
         """Return the arrays of the run.
@@ -154,11 +170,15 @@ class StoredRun:
         """Return times (frames,), and x, y and tension as (frames, vesicles, 3, points)."""
         vesicles, points = len(self.summary.scene.vesicles), self.summary.work.points
         assert points is not None
-        content = self._client.get(
-            f"/runs/{self.summary.key}/frames", headers={"Accept": "application/octet-stream"}
-        ).content
-        rows = np.frombuffer(content, dtype="<f4").reshape(-1, 1 + 3 * vesicles * points).astype(float)
-        return rows[:, 0], rows[:, 1:].reshape(-1, vesicles, 3, points)
+        values = 1 + 3 * vesicles * points
+        found = []
+        for page in self._pages("frames", values, headers={"Accept": "application/octet-stream"}):
+            rows = np.frombuffer(page.content, dtype="<f4").reshape(-1, values).astype(float)
+            found.append(rows)
+            if len(rows) < max(VALUES_AT_ONCE // values, 1):
+                break
+        frames = np.concatenate(found)
+        return frames[:, 0], frames[:, 1:].reshape(-1, vesicles, 3, points)
 
 
 class Client(AbstractContextManager["Client"]):

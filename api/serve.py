@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import gc
 import logging
+import math
 import subprocess
 import sys
 from collections.abc import AsyncIterator, Callable, Iterator
@@ -20,7 +21,7 @@ from api.app import create_app
 from api.auth.authentication import Authentication, is_loopback
 from api.auth.tokens import Tokens
 from api.database.service_database import Database, look_up_for
-from api.http.bounded_protocol import bounded_protocol
+from api.http.bounded_protocol import ConnectionLimits, bounded_protocol
 from api.http.rate_limits import RateLimits
 from api.jobs.job_queue import Jobs
 from api.jobs.submissions import Submissions
@@ -61,7 +62,7 @@ def serve(settings: Settings, host: str, port: int, workers: int) -> None:
         tokens.
     """
     with open_service(settings) as service:
-        if not service.authentication.required and not is_loopback(host):
+        if not service.tokens.have_existed() and not is_loopback(host):
             raise BadInput(
                 f"host: other machines reach {host}, which needs tokens, and there are none; "
                 "make one with `ensemble token create`"
@@ -73,8 +74,6 @@ def serve(settings: Settings, host: str, port: int, workers: int) -> None:
 @contextmanager
 def open_service(settings: Settings) -> Iterator[Service]:
     """Open the parts of a service.
-
-    Requests need tokens if there are any, even if all of them have expired.
 
     Parameters
     ----------
@@ -94,17 +93,19 @@ def open_service(settings: Settings) -> Iterator[Service]:
         database = stack.enter_context(Database.open(settings.database_url, store.path))
         look_up = look_up_for([settings.database_url, Place.of(store.path).url])
         tokens = Tokens(database)
+        limits = RateLimits(settings.request_rate, settings.submission_rate, settings.refusal_rate)
         yield Service(
             settings=settings,
             store=store,
             jobs=Jobs(database, store.path),
-            submissions=Submissions(settings.maximum_cost),
+            submissions=Submissions(settings.maximum_cost, settings.maximum_recorded),
             # Kept for less time than a listener waits, so no listener receives an older state than before.
             watched_jobs=TTLCache(WATCHED_JOBS, ttl=settings.event_seconds / 2),
+            tokens=tokens,
+            limits=limits,
             authentication=Authentication(
                 tokens,
-                RateLimits(settings.request_rate, settings.refusal_rate),
-                required=bool(tokens.all()),
+                limits,
                 look_up=look_up,
             ),
             look_up=look_up,
@@ -112,7 +113,7 @@ def open_service(settings: Settings) -> Iterator[Service]:
 
 
 def server_configuration(app: FastAPI, settings: Settings, host: str, port: int) -> uvicorn.Config:
-    """Return the configuration of uvicorn, with the limits for connections and heads of requests.
+    """Return the configuration of uvicorn, with the limits for connections.
 
     Parameters
     ----------
@@ -129,14 +130,37 @@ def server_configuration(app: FastAPI, settings: Settings, host: str, port: int)
         app,
         host=host,
         port=port,
-        http=bounded_protocol(settings.header_bytes, settings.header_seconds),
+        http=bounded_protocol(connection_limits(settings)),
         ws="none",
         access_log=False,
         server_header=False,
-        # Clients can send the headers of proxies themselves, so they are not trusted.
-        proxy_headers=False,
+        # Clients can send the headers of proxies themselves, so only those of trusted proxies count.
+        proxy_headers=bool(settings.proxies),
+        forwarded_allow_ips=list(settings.proxies),
         limit_concurrency=settings.connections,
+        timeout_keep_alive=math.ceil(settings.idle_seconds) + 1,  # the protocol has an earlier limit
         timeout_graceful_shutdown=DRAIN_SECONDS,
+    )
+
+
+def connection_limits(settings: Settings) -> ConnectionLimits:
+    """Return the limits for the phases of a connection.
+
+    Parameters
+    ----------
+    settings : Settings
+
+    Returns
+    -------
+    ConnectionLimits
+    """
+    return ConnectionLimits(
+        head_bytes=settings.header_bytes,
+        head_seconds=settings.header_seconds,
+        body_bytes=settings.body_bytes,
+        body_seconds=settings.body_seconds,
+        answer_seconds=settings.answer_seconds,
+        idle_seconds=settings.idle_seconds,
     )
 
 
@@ -147,7 +171,7 @@ def _with_workers(service: Service, workers: int) -> Callable[[FastAPI], Abstrac
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
-        if not service.authentication.required:
+        if not service.tokens.have_existed():
             log.warning("There are no tokens: everybody who reaches this address may do everything.")
         to_thread.current_default_thread_limiter().total_tokens = THREADS
         tasks = [asyncio.create_task(_keep_worker_running(command)) for _ in range(workers)]

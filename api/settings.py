@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from ipaddress import ip_network
 from pathlib import Path
 from typing import Annotated
 
@@ -20,7 +21,21 @@ def _parsable_rate(text: str) -> str:
     return text
 
 
+def _addresses(text: str) -> tuple[str, ...]:
+    """Return the addresses and networks in a list with commas; ValueError if one is none."""
+    addresses = tuple(part.strip() for part in text.split(",") if part.strip())
+    for address in addresses:
+        ip_network(address)
+    return addresses
+
+
+def _parsable_addresses(text: str) -> str:
+    _addresses(text)
+    return text
+
+
 Rate = Annotated[str, AfterValidator(_parsable_rate)]
+Addresses = Annotated[str, AfterValidator(_parsable_addresses)]
 JOBS_DATABASE = "jobs.sqlite"  # in the store, unless a database server is set
 
 
@@ -48,6 +63,9 @@ class Settings(BaseSettings):
     maximum_cost: float = Field(
         1e9, gt=0, description="Largest cost of a job: points × vesicles × time to simulate."
     )
+    maximum_recorded: float = Field(
+        1e9, gt=0, description="Most numbers that a job may record, over all runs; each takes up to 8 bytes."
+    )
 
     body_bytes: int = Field(1 << 18, ge=1, description="Largest body of a request, in bytes.")
     body_seconds: float = Field(
@@ -57,16 +75,35 @@ class Settings(BaseSettings):
     header_seconds: float = Field(
         10.0, gt=0, description="Time within which request line and headers must arrive, in seconds."
     )
+    answer_seconds: float = Field(
+        30.0,
+        gt=0,
+        description="Time within which a client must read each 64 kB of an answer, in seconds.",
+    )
+    idle_seconds: float = Field(
+        5.0, gt=0, description="Time for which a connection stays open without a request, in seconds."
+    )
     connections: int = Field(
         1000, ge=1, description="Simultaneous connections; further ones are answered with 503."
     )
     frame_values: int = Field(
-        1_000_000, ge=1, description="Largest number of values in one answer about recorded states."
+        1_000_000,
+        ge=1,
+        description="Largest number of values in one answer about diagnostics or recorded states.",
     )
 
     request_rate: Rate = Field("6000/minute", description="Largest rate of requests of one user.")
+    submission_rate: Rate = Field(
+        "2000/hour", description="Largest rate of submissions of one user, dismissed ones included."
+    )
     refusal_rate: Rate = Field(
-        "20/minute", description="Largest rate of invalid tokens from one address; then all are refused."
+        "20/minute",
+        description="Largest rate of invalid tokens from one address; further ones are answered with 429.",
+    )
+    trusted_proxies: Addresses = Field(
+        "",
+        description="Addresses or networks of proxies, with commas between them; their `X-Forwarded-For` "
+        "names the client.",
     )
 
     event_seconds: float = Field(
@@ -74,6 +111,11 @@ class Settings(BaseSettings):
         gt=0,
         description="Interval between readings of a job whose events a client listens to, in seconds.",
     )
+
+    @property
+    def proxies(self) -> tuple[str, ...]:
+        """Addresses and networks of the trusted proxies."""
+        return _addresses(self.trusted_proxies)
 
     @property
     def database_url(self) -> str:

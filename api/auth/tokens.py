@@ -11,7 +11,7 @@ from datetime import datetime, timedelta
 
 from pydantic import BaseModel, ConfigDict
 from rich.table import Table
-from sqlalchemy import bindparam, delete, insert, select
+from sqlalchemy import bindparam, exists, insert, select, update
 
 from api.auth import TokenScope
 from api.database.database_tables import TokenRow
@@ -48,7 +48,10 @@ class Token(BaseModel):
 
 
 _COLUMNS = tuple(getattr(TokenRow, name) for name in Token.model_fields)
-_BY_IDENTIFIER = select(*_COLUMNS, TokenRow.digest).where(TokenRow.id == bindparam("identifier"))
+_VALID = TokenRow.revoked.is_(None)
+_BY_IDENTIFIER = select(*_COLUMNS, TokenRow.digest).where(TokenRow.id == bindparam("identifier"), _VALID)
+_EXPIRY = select(TokenRow.expires).where(TokenRow.id == bindparam("identifier"), _VALID)
+_ANY = select(exists().select_from(TokenRow))
 
 
 class Tokens:
@@ -106,7 +109,7 @@ class Tokens:
         Returns
         -------
         Token or None
-            None if the token is unknown or expired.
+            None if the token is unknown, expired or revoked.
         """
         identifier, _, secret = text[:MAXIMUM_LENGTH].partition(".")
         with self._database.connect() as connection:
@@ -117,10 +120,31 @@ class Tokens:
             return None
         return Token.model_validate(row)
 
-    def all(self) -> list[Token]:
-        """Return all tokens, expired ones included, the oldest first."""
+    def is_valid(self, identifier: str) -> bool:
+        """Tell whether a token is neither revoked nor expired.
+
+        Parameters
+        ----------
+        identifier : str
+            The `id` of the token.
+
+        Returns
+        -------
+        bool
+        """
         with self._database.connect() as connection:
-            rows = connection.execute(select(*_COLUMNS).order_by(TokenRow.created, TokenRow.id))
+            expires = connection.scalar(_EXPIRY, {"identifier": identifier})
+        return expires is not None and expires > self._clock()
+
+    def have_existed(self) -> bool:
+        """Tell whether a token has ever been created, even if all of them have been revoked."""
+        with self._database.connect() as connection:
+            return bool(connection.scalar(_ANY))
+
+    def all(self) -> list[Token]:
+        """Return all tokens that were not revoked, expired ones included, the oldest first."""
+        with self._database.connect() as connection:
+            rows = connection.execute(select(*_COLUMNS).where(_VALID).order_by(TokenRow.created, TokenRow.id))
             return [Token.model_validate(row) for row in rows]
 
     def revoke(self, identifier: str) -> None:
@@ -136,9 +160,10 @@ class Tokens:
         BadInput
             If there is no such token.
         """
+        revoked = update(TokenRow).where(TokenRow.id == identifier, _VALID).values(revoked=self._clock())
         with self._database.begin() as connection:
-            removed = connection.execute(delete(TokenRow).where(TokenRow.id == identifier))
-        if not removed.rowcount:
+            changed = connection.execute(revoked).rowcount
+        if not changed:
             raise BadInput(f"token: there is no token with the id {identifier!r}")
 
 

@@ -119,7 +119,10 @@ class JobRow(ServiceTable):
 
 
 class TokenRow(ServiceTable):
-    """A bearer token: its user, scope and lifetime, and a digest of its secret part."""
+    """A bearer token: its user, scope and lifetime, and a digest of its secret part.
+
+    Tokens that were revoked stay: a service that has ever had a token needs one.
+    """
 
     __tablename__ = "tokens"
 
@@ -129,3 +132,4 @@ class TokenRow(ServiceTable):
     digest: Mapped[str]
     created: Mapped[datetime]
     expires: Mapped[datetime]
+    revoked: Mapped[datetime | None]

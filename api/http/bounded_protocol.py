@@ -1,104 +1,208 @@
-"""HTTP/1.1 with limits on the head of a request, against clients that send slowly or without end."""
+"""HTTP/1.1 in which every phase of a connection has its time and its size."""
 
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum, auto
 from typing import Any
 
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
 _END_OF_HEAD = b"\r\n\r\n"
+_GRACE_SECONDS = 1.0  # for the application to answer that a body was too slow, before the connection ends
+_WIRE = 8  # most bytes that are sent for a byte of a body: chunks of one byte have five more around it
 
 
-class BoundedProtocol(HttpToolsProtocol):
-    """Close a connection if the head of a request is too large or incomplete after a time limit.
+@dataclass(frozen=True)
+class ConnectionLimits:
+    """Limits for the phases of a connection.
 
-    The head is the request line and the headers. Uvicorn itself has no such limits. Use
-    `bounded_protocol`, which makes a subclass with the two limits.
+    Attributes
+    ----------
+    head_bytes : int
+        Largest size of a request line with its headers.
+    head_seconds : float
+        Time within which a head must arrive, from the start of the connection or of the request.
+    body_bytes : int
+        Largest body; also the most that is read after the answer.
+    body_seconds : float
+        Time within which a body must arrive, whether or not it is read.
+    answer_seconds : float
+        Time within which a client must read what has been sent, so that there is room for more.
+    idle_seconds : float
+        Time from an answer to the next request.
     """
 
     head_bytes: int
     head_seconds: float
+    body_bytes: int
+    body_seconds: float
+    answer_seconds: float
+    idle_seconds: float
 
-    _head_timer: asyncio.TimerHandle | None = None
-    _head_received = 0
+
+class _Phase(Enum):
+    """What is expected from the client."""
+
+    HEAD = auto()
+    BODY = auto()
+    NOTHING = auto()
+
+
+class BoundedProtocol(HttpToolsProtocol):
+    """Close a connection if a phase of it takes too long or is too large.
+
+    Uvicorn itself limits only the time between requests, and forgets that when a byte arrives. Use
+    `bounded_protocol`, which makes a subclass with limits.
+    """
+
+    limits: ConnectionLimits
+    _phase = _Phase.HEAD
+    _received = 0  # bytes in this phase
+    _received_after_answer = 0
+    _incoming: asyncio.TimerHandle | None = None
+    _outgoing: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Start the time limit for the first request; see `asyncio.Protocol`.
+        """Expect the head of the first request; see `asyncio.Protocol`.
 
         Parameters
         ----------
         transport : asyncio.Transport
         """
         super().connection_made(transport)
-        self._expect_head()
+        self._expect(_Phase.HEAD, self.limits.head_seconds, self._refuse)
 
     def on_message_begin(self) -> None:
-        """Start the time limit for a further request on the same connection."""
+        """Expect the head of a further request on the same connection."""
         super().on_message_begin()
-        if self._head_timer is None:
-            self._expect_head()
+        # By this a route may end an answer at once: so the client sees that it is incomplete.
+        self.scope["state"]["abort"] = self.transport.abort
+        if self._phase is not _Phase.HEAD:
+            self._expect(_Phase.HEAD, self.limits.head_seconds, self._refuse)
+
+    def on_headers_complete(self) -> None:
+        """Expect the body."""
+        self._expect(_Phase.BODY, self.limits.body_seconds + _GRACE_SECONDS, self._close)
+        super().on_headers_complete()
+
+    def on_message_complete(self) -> None:
+        """Expect nothing until the answer has been sent."""
+        super().on_message_complete()
+        self._expect(_Phase.NOTHING)
+        self._await_next_request()
+
+    def on_response_complete(self) -> None:
+        """Expect the next request, or that the client reads the last answer."""
+        super().on_response_complete()
+        self._received_after_answer = 0
+        if self.transport.is_closing():
+            self._expect_reader()
+        else:
+            self._await_next_request()
 
     def data_received(self, data: bytes) -> None:
-        """Check the size of the head and parse the data; see `asyncio.Protocol`.
+        """Check the size of what has arrived and parse it; see `asyncio.Protocol`.
 
         Parameters
         ----------
         data : bytes
         """
-        # Parsing a complete head stops the timer, so a head that ends in this data is measured before.
+        # Parsing a complete head ends its phase, so a head that ends in this data is measured before.
         remaining_head = max(data.find(_END_OF_HEAD), 0)
-        if self._head_timer is not None and self._head_received + remaining_head > self.head_bytes:
+        if self._phase is _Phase.HEAD and self._received + remaining_head > self.limits.head_bytes:
             self._refuse()
             return
-        super().data_received(data)
-        if self._head_timer is not None:
-            self._head_received += len(data)
-            if self._head_received > self.head_bytes:
-                self._refuse()
+        self._received += len(data)
+        super().data_received(data)  # a phase that begins in this data is counted from the next on
+        if self.transport.is_closing():
+            return
+        if self._phase is _Phase.HEAD and self._received > self.limits.head_bytes:
+            self._refuse()
+        elif self._phase is _Phase.BODY and self._is_body_too_long(len(data)):
+            self._close()
 
-    def on_headers_complete(self) -> None:
-        """Stop the time limit: the head is complete."""
-        self._stop_timer()
-        super().on_headers_complete()
+    def _is_body_too_long(self, size: int) -> bool:
+        """Tell whether more has arrived than any body needs, or than is read once the answer is sent."""
+        if self.cycle.response_complete:
+            self._received_after_answer += size
+        return (
+            self._received > _WIRE * self.limits.body_bytes + self.limits.head_bytes
+            or self._received_after_answer > self.limits.body_bytes
+        )
+
+    def pause_writing(self) -> None:
+        """Expect that the client reads; see `asyncio.Protocol`."""
+        super().pause_writing()
+        self._expect_reader()
+
+    def resume_writing(self) -> None:
+        """Note that the client has read; see `asyncio.Protocol`."""
+        super().resume_writing()
+        if not self.transport.is_closing():
+            _stopped(self._outgoing)
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Stop the time limit: the connection is closed; see `asyncio.Protocol`.
+        """Stop all time limits: the connection is closed; see `asyncio.Protocol`.
 
         Parameters
         ----------
         exc : Exception or None
         """
-        self._stop_timer()
+        _stopped(self._incoming)
+        _stopped(self._outgoing)
         super().connection_lost(exc)
 
-    def _expect_head(self) -> None:
-        self._head_timer = self.loop.call_later(self.head_seconds, self._refuse)
+    def _expect(
+        self, phase: _Phase, seconds: float | None = None, otherwise: Callable[[], None] | None = None
+    ) -> None:
+        """Begin a phase, which must end within a time or else something is done."""
+        _stopped(self._incoming)
+        self._phase, self._received = phase, 0
+        self._incoming = None if otherwise is None else self.loop.call_later(seconds or 0.0, otherwise)
 
-    def _stop_timer(self) -> None:
-        if self._head_timer is not None:
-            self._head_timer.cancel()
-            self._head_timer = None
-            self._head_received = 0
+    def _expect_reader(self) -> None:
+        _stopped(self._outgoing)
+        self._outgoing = self.loop.call_later(self.limits.answer_seconds, self.transport.abort)
+
+    def _await_next_request(self) -> None:
+        """Limit the idle time, if the request has arrived and all answers have been sent."""
+        if self._phase is _Phase.NOTHING and self.cycle.response_complete:
+            self._expect(_Phase.NOTHING, self.limits.idle_seconds, self._close)
 
     def _refuse(self) -> None:
-        if not self.transport.is_closing():
+        is_answering = self.cycle is not None and not self.cycle.response_complete
+        if not self.transport.is_closing() and not is_answering:
             self.send_400_response("The head of the request is too large or too slow.")
+        self._close()
+
+    def _close(self) -> None:
+        """Close the connection: at once if an answer is under way or unread."""
+        is_answering = self.cycle is not None and not self.cycle.response_complete
+        if is_answering:
+            self.transport.abort()
+            return
+        self.transport.close()
+        self._expect_reader()
 
 
-def bounded_protocol(head_bytes: int, head_seconds: float) -> type[BoundedProtocol]:
+def _stopped(timer: asyncio.TimerHandle | None) -> None:
+    if timer is not None:
+        timer.cancel()
+
+
+def bounded_protocol(limits: ConnectionLimits) -> type[BoundedProtocol]:
     """Return a protocol class for uvicorn with these limits.
 
     Parameters
     ----------
-    head_bytes : int
-        Largest size of a request line with its headers.
-    head_seconds : float
-        Time within which a head must arrive, from the start of the connection or of the request.
+    limits : ConnectionLimits
 
     Returns
     -------
     type
     """
-    limits: dict[str, Any] = {"head_bytes": head_bytes, "head_seconds": head_seconds}
-    return type("LimitedProtocol", (BoundedProtocol,), limits)
+    members: dict[str, Any] = {"limits": limits}
+    return type("LimitedProtocol", (BoundedProtocol,), members)

@@ -1,4 +1,4 @@
-"""ASGI middleware: limits on a request's body, headers of every answer, and counts of requests."""
+"""ASGI middleware: bodies of requests and answers within limits, headers of answers, counts of requests."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ SECURITY_HEADERS = {
 }
 _ENCODED_HEADERS = [(name.lower().encode(), value.encode()) for name, value in SECURITY_HEADERS.items()]
 
+PIECE_BYTES = 1 << 16
 UNKNOWN_ROUTE = "unknown"  # one label for all paths without a route: clients could invent any number of them
 
 
@@ -86,6 +87,44 @@ class BodyLimits:
                 HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
                 f"body: {size} bytes — must be at most {self._maximum_bytes}",
             )
+
+
+class Pieces:
+    """Send a long body in pieces, and each piece only when the client has read enough of the earlier ones.
+
+    So the server's limit for the time in which a client reads holds for each piece.
+
+    Parameters
+    ----------
+    app : ASGIApp
+        The application whose answers are sent so.
+    """
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request; see the ASGI specification for the arguments.
+
+        Parameters
+        ----------
+        scope : Scope
+        receive : Receive
+        send : Send
+        """
+
+        async def send_pieces(message: Message) -> None:
+            body = message.get("body", b"")
+            if len(body) <= PIECE_BYTES:
+                await send(message)
+                return
+            rest = memoryview(body)
+            while len(rest) > PIECE_BYTES:
+                await send({**message, "body": bytes(rest[:PIECE_BYTES]), "more_body": True})
+                rest = rest[PIECE_BYTES:]
+            await send({**message, "body": bytes(rest)})
+
+        await self._app(scope, receive, send_pieces)
 
 
 class SecurityHeaders:

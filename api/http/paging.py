@@ -8,7 +8,7 @@ from typing import Annotated, Generic, TypeVar
 from urllib.parse import urlsplit
 
 from fastapi import Query, Request, Response
-from pydantic import BaseModel
+from pydantic import BaseModel, StringConstraints
 
 from api.http.caching import json_response
 from ensemble.store import Record
@@ -21,7 +21,7 @@ After = Annotated[
     Query(max_length=64, pattern="^[0-9a-z-]+$", description="Key of the last item of the previous page."),
 ]
 Where = Annotated[
-    list[str],
+    list[Annotated[str, StringConstraints(max_length=1000)]],
     Query(max_length=20, description="Conditions such as flow.rate>=0.5 or outcome=bound. All must hold."),
 ]
 

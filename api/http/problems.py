@@ -18,6 +18,7 @@ from ensemble.errors import BadInput
 
 MEDIA_TYPE = "application/problem+json"
 MAXIMUM_FIELDS = 10  # invalid fields that one answer names
+LONGEST_DETAIL = 2000  # characters
 
 
 class ProblemDocument(BaseModel):
@@ -97,8 +98,11 @@ def install_handlers(app: FastAPI, missing: Iterable[type[Exception]]) -> None:
 
 
 def _response(problem: Problem) -> Response:
+    detail = problem.detail  # may quote what a client has sent
+    if len(detail) > LONGEST_DETAIL:
+        detail = f"{detail[:LONGEST_DETAIL]}…"
     document = ProblemDocument(
-        title=problem.status.phrase, status=problem.status, detail=problem.detail, **problem.members
+        title=problem.status.phrase, status=problem.status, detail=detail, **problem.members
     )
     # Escaped to ASCII: the detail may quote characters of the request that cannot be encoded as UTF-8.
     return Response(

@@ -21,6 +21,7 @@ from ensemble.questions import Question, kind_of, kinds, preset_question
 from solver.scene import Model
 
 MAXIMUM_FIELDS = 10  # invalid fields that one message names
+MOST_VALUES = 5000  # that changes may have; 256 vesicles with all their fields have half of that
 MOST_CACHED = 256
 LONGEST_CACHED = 4096  # bytes
 
@@ -70,7 +71,7 @@ Submission: type[SubmissionFields] = create_model(
 
 
 class Estimate(BaseModel):
-    """Upper bound of the cost of a job, which is refused if it is above the maximum.
+    """Upper bounds of what a job costs and records; it is refused if one is above its maximum.
 
     Attributes
     ----------
@@ -80,17 +81,23 @@ class Estimate(BaseModel):
         Points × vesicles × time to simulate, over all runs.
     maximum : float
         The most that a job may cost.
+    recorded : float
+        Numbers that are recorded, over all runs.
+    most_recorded : float
+        The most that a job may record.
     accepted : bool
-        Whether the cost is at most the maximum.
+        Whether the job keeps both limits.
     """
 
     runs: int
     cost: float
     maximum: float
+    recorded: float
+    most_recorded: float
     accepted: bool
 
 
-def estimate(question: Question[Any], maximum: float) -> Estimate:
+def estimate(question: Question[Any], maximum: float, most_recorded: float) -> Estimate:
     """Compare the cost of a question with the most that a job may cost.
 
     Parameters
@@ -99,6 +106,8 @@ def estimate(question: Question[Any], maximum: float) -> Estimate:
         What the job answers.
     maximum : float
         The most that a job may cost.
+    most_recorded : float
+        The most numbers that it may record.
 
     Returns
     -------
@@ -117,7 +126,9 @@ def estimate(question: Question[Any], maximum: float) -> Estimate:
         runs=cost.runs,
         cost=min(cost.work, sys.float_info.max),  # JSON has no word for infinity
         maximum=maximum,
-        accepted=cost.work <= maximum,
+        recorded=min(cost.recorded, sys.float_info.max),
+        most_recorded=most_recorded,
+        accepted=cost.work <= maximum and cost.recorded <= most_recorded,
     )
 
 
@@ -168,10 +179,12 @@ class Submissions:
     ----------
     maximum_cost : float
         The most that a job may cost.
+    maximum_recorded : float
+        The most numbers that it may record.
     """
 
-    def __init__(self, maximum_cost: float) -> None:
-        self._maximum_cost = maximum_cost
+    def __init__(self, maximum_cost: float, maximum_recorded: float) -> None:
+        self._limits = maximum_cost, maximum_recorded
         self._cache: LRUCache[bytes, CheckedSubmission] = LRUCache(MOST_CACHED)
 
     async def read(self, body: bytes) -> CheckedSubmission:
@@ -202,7 +215,7 @@ class Submissions:
     def _check(self, body: bytes) -> CheckedSubmission:
         submission = read_submission(body)
         question = submitted_question(submission)
-        return CheckedSubmission(submission, question, estimate(question, self._maximum_cost))
+        return CheckedSubmission(submission, question, estimate(question, *self._limits))
 
 
 def read_submission(body: bytes) -> SubmissionFields:
@@ -226,6 +239,7 @@ def read_submission(body: bytes) -> SubmissionFields:
     try:
         document = from_json(body)
         if isinstance(document, dict):
+            _limit_values(document.get("set"))
             for kind in kinds():
                 kind.check_size(document.get(kind.kind))
         return Submission.model_validate_json(body, strict=True)
@@ -234,6 +248,18 @@ def read_submission(body: bytes) -> SubmissionFields:
         raise BadInput(describe(errors, {})) from error
     except ValueError as error:
         raise BadInput(f"body: {error}") from error
+
+
+def _limit_values(changes: Any) -> None:
+    """Refuse changes of too many values: each is copied into the document several times."""
+    values, rest = 0, [changes]
+    while rest:
+        node = rest.pop()
+        values += 1
+        if values > MOST_VALUES:
+            raise ValueError(f"set has too many values — must have at most {MOST_VALUES}")
+        if isinstance(node, dict | list):
+            rest += node.values() if isinstance(node, dict) else node
 
 
 def submitted_question(submission: SubmissionFields) -> Question[Any]:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Self
 
 import numpy as np
 from pydantic import BaseModel
 
-from solver.analysis.run import Run
+from solver.analysis.run import Array
 from solver.flows import ImposedFlow
+from solver.scene import Scene
 
 _GRID = 33  # positions along each axis
 _MARGIN = 1.0  # around the places of the vesicles, in the largest length of a vesicle
@@ -75,25 +77,34 @@ class FlowField(BaseModel):
     velocity: list[list[list[float]]]
 
 
-def flow_field(run: Run) -> FlowField | None:
+def flow_field(scene: Scene, centers: Iterable[Array]) -> FlowField | None:
     """Return the imposed velocity around the vesicles of a run.
 
     Parameters
     ----------
-    run : Run
+    scene : Scene
+    centers : iterable of (frames, vesicles, 2)
+        Of the recorded states, piece by piece.
 
     Returns
     -------
     FlowField or None
         None in a fluid at rest, and if the run has no finite state.
     """
-    flow, centers = run.scene.flow, run.frames.center
-    finite = np.isfinite(centers).all(axis=(1, 2))
-    if flow is None or flow.rate == 0 or not finite.any():
+    flow = scene.flow
+    if flow is None or flow.rate == 0:
         return None
-    margin = _MARGIN * max(vesicle.length for vesicle in run.scene.vesicles)
-    low = centers[finite].min(axis=(0, 1)) - margin
-    high = centers[finite].max(axis=(0, 1)) + margin
-    x, y = (np.linspace(*ends, _GRID) for ends in zip(low, high, strict=True))
-    velocity = flow.velocity(np.stack(np.meshgrid(x, y)), centers[finite][0].T)
+    first: Array | None = None
+    low, high = np.full(2, np.inf), np.full(2, -np.inf)
+    for piece in centers:
+        finite = piece[np.isfinite(piece).all(axis=(1, 2))]
+        if len(finite):
+            first = finite[0] if first is None else first
+            low = np.minimum(low, finite.min(axis=(0, 1)))
+            high = np.maximum(high, finite.max(axis=(0, 1)))
+    if first is None:
+        return None
+    margin = _MARGIN * max(vesicle.length for vesicle in scene.vesicles)
+    x, y = (np.linspace(*ends, _GRID) for ends in zip(low - margin, high + margin, strict=True))
+    velocity = flow.velocity(np.stack(np.meshgrid(x, y)), first.T)
     return FlowField(x=x.tolist(), y=y.tolist(), velocity=velocity.tolist())

@@ -1,24 +1,39 @@
-"""Arrays of a run as clients read them: diagnostics over time, and recorded states as points in the plane."""
+"""Arrays of a run as clients read them: diagnostics over time, and recorded states as points in the plane.
+
+They are read and written piece by piece, so an answer needs little memory however long the run is.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from pydantic import BaseModel
+from pydantic_core import to_json
 
 from ensemble.errors import BadInput
-from solver.analysis.run import Array, Run
+from ensemble.store.archive import StoredArrays
+from solver.analysis.run import Array
 from solver.membrane.curve import positions
+
+PIECE_VALUES = 1 << 16  # that are read and written at once
 
 
 class SeriesDocument(BaseModel):
-    """Diagnostics over time by name; null where a value is not finite."""
+    """Diagnostics over time by name; null where a value is not finite.
+
+    Attributes
+    ----------
+    series : dict
+        Values by name, of the selected records.
+    total : int
+        Number of records of the run.
+    """
 
     series: dict[str, list[float | None]]
+    total: int
 
 
 class FramesDocument(BaseModel):
@@ -44,130 +59,195 @@ class FramesDocument(BaseModel):
 
 
 @dataclass(frozen=True)
-class FrameSelection:
-    """Some of the frames of a run, with positions in the plane.
+class SeriesSelection:
+    """Some of the records of some diagnostics of a run.
 
     Attributes
     ----------
-    index : list of int
-        Number of each frame in the run.
-    time : (frames,)
-    position : (frames, vesicles, 2, points)
-    tension : (frames, vesicles, points)
+    arrays : StoredArrays
+    names : sequence of str
+    numbers : range
+        Of the records.
     total : int
-        Number of frames of the run.
+        Number of records of the run.
     """
 
-    index: list[int]
-    time: Array
-    position: Array
-    tension: Array
+    arrays: StoredArrays
+    names: Sequence[str]
+    numbers: range
     total: int
 
+    @classmethod
+    def of(
+        cls, arrays: StoredArrays, names: Sequence[str], numbers: range, maximum_values: int
+    ) -> SeriesSelection:
+        """Select records.
 
-def series_document(run: Run, names: Sequence[str]) -> SeriesDocument:
-    """Return diagnostics of a run.
+        Parameters
+        ----------
+        arrays : StoredArrays
+            Of a run.
+        names : sequence of str
+            Names of diagnostics; if it is empty, all are selected.
+        numbers : range
+            Numbers of the records; those that the run does not have are left out.
+        maximum_values : int
+            Largest number of values.
 
-    Parameters
+        Returns
+        -------
+        SeriesSelection
+
+        Raises
+        ------
+        BadInput
+            If the run has no diagnostic of a name, or the records hold more values; the message says how
+            many records are allowed.
+        """
+        present = arrays.summary.series
+        unknown = set(names) - set(present)
+        if unknown:
+            raise BadInput(f"name: {min(unknown)!r} — must be one of {', '.join(sorted(present))}")
+        selected = sorted(set(names) or present)
+        total = arrays.shape(selected[0])[0] if selected else 0
+        numbers = _existing(numbers, total, max(len(selected), 1), maximum_values, "records")
+        return cls(arrays, selected, numbers, total)
+
+    def json(self) -> Iterator[bytes]:
+        """Yield a `SeriesDocument` in pieces."""
+        yield b'{"series":{'
+        for place, name in enumerate(self.names):
+            yield b"," * (place > 0) + to_json(name) + b":"
+            yield from _json_array(self.arrays.rows(name, rows) for rows in _blocks(self.numbers, 1))
+        yield b'},"total":%d}' % self.total
+
+
+@dataclass(frozen=True)
+class FrameSelection:
+    """Some of the frames of a run.
+
+    Attributes
     ----------
-    run : Run
-    names : sequence of str
-        Names of diagnostics; if it is empty, all are returned.
-
-    Returns
-    -------
-    SeriesDocument
-
-    Raises
-    ------
-    BadInput
-        If the run has no diagnostic of a name.
-    """
-    unknown = set(names) - run.series.keys()
-    if unknown:
-        raise BadInput(f"name: {min(unknown)!r} — must be one of {', '.join(sorted(run.series))}")
-    selected = sorted(set(names) or run.series.keys())
-    return SeriesDocument(series={name: _finite_or_none(run.series[name]) for name in selected})
-
-
-def select_frames(run: Run, numbers: range, maximum_values: int) -> FrameSelection:
-    """Return frames of a run.
-
-    Parameters
-    ----------
-    run : Run
+    arrays : StoredArrays
     numbers : range
-        Numbers of the frames; those that the run does not have are left out.
-    maximum_values : int
-        Largest number of values in the selected frames.
+        Of the frames.
+    total : int
+        Number of frames of the run.
+    values : int
+        Number of values in a frame.
+    """
 
-    Returns
-    -------
-    FrameSelection
+    arrays: StoredArrays
+    numbers: range
+    total: int
+    values: int
 
-    Raises
+    @classmethod
+    def of(cls, arrays: StoredArrays, numbers: range, maximum_values: int) -> FrameSelection:
+        """Select frames.
+
+        Parameters
+        ----------
+        arrays : StoredArrays
+            Of a run.
+        numbers : range
+            Numbers of the frames; those that the run does not have are left out.
+        maximum_values : int
+            Largest number of values.
+
+        Returns
+        -------
+        FrameSelection
+
+        Raises
+        ------
+        BadInput
+            If the frames hold more values; the message says how many frames are allowed.
+        """
+        total = arrays.shape("frame_time")[0]
+        values = 1 + 3 * math.prod(arrays.shape("tangent_angle")[1:])
+        return cls(arrays, _existing(numbers, total, values, maximum_values, "frames"), total, values)
+
+    def json(self) -> Iterator[bytes]:
+        """Yield a `FramesDocument` in pieces."""
+        yield b'{"index":' + to_json(list(self.numbers)) + b',"time":'
+        yield from _json_array(self._read(self._time))
+        yield b',"position":'
+        yield from _json_array(self._read(self._position))
+        yield b',"tension":'
+        yield from _json_array(self._read(self._tension))
+        yield b',"total":%d}' % self.total
+
+    @property
+    def size(self) -> int:
+        """Length of `binary` in bytes."""
+        return 4 * self.values * len(self.numbers)
+
+    def binary(self) -> Iterator[bytes]:
+        """Yield the frames as little-endian float32, one after the other.
+
+        Yields
+        ------
+        bytes
+            For each frame its time, then for each vesicle x of all points, y of all points and the tensions
+            at these points.
+        """
+        for rows in _blocks(self.numbers, self.values):
+            membranes = np.concatenate([self._position(rows), self._tension(rows)[:, :, None, :]], axis=2)
+            flat = membranes.reshape(len(rows), -1)
+            yield np.column_stack([self._time(rows), flat]).astype("<f4").tobytes()
+
+    def _read(self, read: Callable[[range], Array]) -> Iterator[Array]:
+        return map(read, _blocks(self.numbers, self.values))
+
+    def _time(self, rows: range) -> Array:
+        return self.arrays.rows("frame_time", rows)
+
+    def _tension(self, rows: range) -> Array:
+        return self.arrays.rows("tension", rows)
+
+    def _position(self, rows: range) -> Array:
+        lengths = np.array([vesicle.length for vesicle in self.arrays.summary.scene.vesicles])
+        return positions(self.arrays.rows("tangent_angle", rows), self.arrays.rows("center", rows), lengths)
+
+
+def centers(arrays: StoredArrays) -> Iterator[Array]:
+    """Yield the centers of the vesicles in all recorded states of a run, piece by piece.
+
+    Parameters
+    ----------
+    arrays : StoredArrays
+
+    Yields
     ------
-    BadInput
-        If the frames hold more values; the message says how many frames are allowed.
+    (frames, vesicles, 2)
     """
-    frames, total = run.frames, len(run.frames.time)
-    index = list(range(total)[numbers.start : numbers.stop : numbers.step])
-    values_per_frame = 1 + 3 * math.prod(frames.tangent_angle.shape[1:])
-    maximum_frames = max(maximum_values // values_per_frame, 1)
-    if len(index) > maximum_frames:
+    shape = arrays.shape("center")
+    for rows in _blocks(range(shape[0]), math.prod(shape[1:])):
+        yield arrays.rows("center", rows)
+
+
+def _existing(numbers: range, total: int, values: int, maximum_values: int, what: str) -> range:
+    """Return those of some rows that exist, if they are not too many."""
+    existing = range(total)[numbers.start : numbers.stop : numbers.step]
+    most = max(maximum_values // values, 1)
+    if len(existing) > most:
         raise BadInput(
-            f"stride: leaves {len(index)} frames — must leave at most {maximum_frames} of this run"
+            f"stride: leaves {len(existing)} {what} — must leave at most {most} in one answer about this run"
         )
-    length = np.array([vesicle.length for vesicle in run.scene.vesicles])
-    return FrameSelection(
-        index=index,
-        time=frames.time[index],
-        position=positions(frames.tangent_angle[index], frames.center[index], length),
-        tension=frames.tension[index],
-        total=total,
-    )
+    return existing
 
 
-def frames_document(frames: FrameSelection) -> FramesDocument:
-    """Return frames as JSON data.
-
-    Parameters
-    ----------
-    frames : FrameSelection
-
-    Returns
-    -------
-    FramesDocument
-    """
-    return FramesDocument(
-        index=frames.index,
-        time=_finite_or_none(frames.time),
-        position=_finite_or_none(frames.position),
-        tension=_finite_or_none(frames.tension),
-        total=frames.total,
-    )
+def _blocks(numbers: range, values: int) -> Iterator[range]:
+    """Cut rows of so many values into blocks of about `PIECE_VALUES`."""
+    at_once = max(PIECE_VALUES // values, 1)
+    for start in range(0, len(numbers), at_once):
+        yield numbers[start : start + at_once]
 
 
-def frames_bytes(frames: FrameSelection) -> bytes:
-    """Return frames as little-endian float32, one frame after the other.
-
-    Parameters
-    ----------
-    frames : FrameSelection
-
-    Returns
-    -------
-    bytes
-        For each frame its time, then for each vesicle x of all points, y of all points and the tensions at
-        these points.
-    """
-    membranes = np.concatenate([frames.position, frames.tension[:, :, None, :]], axis=2)
-    flat = membranes.reshape(len(frames.index), math.prod(membranes.shape[1:]))
-    return np.column_stack([frames.time, flat]).astype("<f4").tobytes()
-
-
-def _finite_or_none(values: Array) -> Any:
-    """Return an array as nested lists, with None for values that JSON cannot write."""
-    objects = values.astype(object)
-    objects[~np.isfinite(values)] = None
-    return objects.tolist()
+def _json_array(pieces: Iterable[Array]) -> Iterator[bytes]:
+    """Write arrays one after the other as one array of JSON, with null for what JSON cannot write."""
+    yield b"["
+    for place, piece in enumerate(pieces):
+        yield b"," * (place > 0) + to_json(piece.tolist(), inf_nan_mode="null")[1:-1]
+    yield b"]"

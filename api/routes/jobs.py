@@ -19,7 +19,7 @@ from api.http.paging import CollectionPage, Limit, page_response
 from api.http.problems import Problem, documented
 from api.jobs.job import Job, JobStatus, NoSuchJob, TooManyJobs
 from api.jobs.submissions import CheckedSubmission, Estimate, Submission
-from api.routes.service import Reader, Service, Submitter
+from api.routes.service import Caller, Reader, Service, Submitter
 from api.settings import Settings
 from ensemble.errors import BadInput
 from ensemble.store import Record
@@ -124,11 +124,12 @@ async def submit_job(
     BadInput
         If a field is invalid; the message names it.
     Problem
-        If the job is too large, or its owner has too many unfinished jobs.
+        If the job is too large, or its owner has too many unfinished jobs or submits too often.
     """
     service = submitter.service
     checked = await service.submissions.read(body)
     ranks, seconds = _resources(service.settings, checked)
+    await service.limits.count_submission(submitter.user)
     pending = service.jobs.submit(
         checked.question, submitter.user, ranks, seconds, idempotency_key, service.settings.maximum_jobs
     )
@@ -148,6 +149,14 @@ async def submit_job(
 def _resources(settings: Settings, checked: CheckedSubmission) -> tuple[int, float]:
     """Return the number of ranks of a job and the time limit of an attempt, in seconds."""
     cost = checked.estimate
+    if cost.recorded > cost.most_recorded:
+        raise Problem(
+            HTTPStatus.UNPROCESSABLE_ENTITY,
+            f"output: {cost.recorded:.3g} numbers — must be at most {cost.most_recorded:.3g}, over all runs; "
+            "raise output.interval or output.frame_interval",
+            recorded=cost.recorded,
+            most_recorded=cost.most_recorded,
+        )
     if not cost.accepted:
         raise Problem(
             HTTPStatus.UNPROCESSABLE_ENTITY,
@@ -265,6 +274,8 @@ def dismiss_job(submitter: Submitter, identifier: JobKey) -> Job:
 async def watch_job(reader: Reader, identifier: JobKey) -> EventSourceResponse:
     """Send the present state of the job, and the new one after each change, until the job has finished.
 
+    The stream ends, too, when the token is revoked or expires.
+
     Parameters
     ----------
     reader : Caller
@@ -280,15 +291,18 @@ async def watch_job(reader: Reader, identifier: JobKey) -> EventSourceResponse:
         If there is no such job.
     """
     record = await reader.service.look_up(reader.service.jobs.records.one, identifier)
-    return EventSourceResponse(_events(reader.service, record))
+    return EventSourceResponse(_events(reader, record))
 
 
-async def _events(service: Service, record: Record) -> AsyncIterator[ServerSentEvent]:
+async def _events(reader: Caller, record: Record) -> AsyncIterator[ServerSentEvent]:
+    service = reader.service
     yield ServerSentEvent(event="job", data=record.json)
     while not Job.model_validate_json(record.json).status.finished:
         latest = record
         while latest == record:
             await asyncio.sleep(service.settings.event_seconds)
+            if not await reader.is_valid():
+                return
             latest = await _watched_job(service, record.key)
         record = latest
         yield ServerSentEvent(event="job", data=record.json)

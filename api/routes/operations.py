@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from http import HTTPStatus
+from threading import Lock
 
+from cachetools import TTLCache
 from fastapi import APIRouter, Request, Response
 from fastapi.responses import PlainTextResponse
 from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, generate_latest
@@ -14,8 +16,11 @@ from pydantic import BaseModel
 from sqlalchemy.exc import SQLAlchemyError
 
 from api.http.problems import Problem, documented
+from api.jobs.job import JobStatus
 from api.jobs.job_queue import Jobs
 from api.routes.service import Reader, service_of
+
+COUNT_SECONDS = 5.0  # for which the numbers of jobs are kept: to count a million of them takes 0.1 s
 
 health_router = APIRouter(tags=["operations"])
 metrics_router = APIRouter(tags=["operations"])
@@ -28,7 +33,7 @@ class Health(BaseModel):
 
 
 class JobMetrics(Collector):
-    """Number of jobs by status, read from the database when Prometheus asks.
+    """Number of jobs by status, read from the database when Prometheus asks, but not too often.
 
     Parameters
     ----------
@@ -37,6 +42,8 @@ class JobMetrics(Collector):
 
     def __init__(self, jobs: Jobs) -> None:
         self._jobs = jobs
+        self._counts: TTLCache[str, dict[JobStatus, int]] = TTLCache(1, ttl=COUNT_SECONDS)
+        self._counting = Lock()
 
     def collect(self) -> Iterator[Metric]:
         """Read the number of jobs of each status.
@@ -46,7 +53,11 @@ class JobMetrics(Collector):
         Metric
         """
         (family,) = self.describe()
-        for status, count in self._jobs.counts().items():
+        with self._counting:
+            counts = self._counts.get("jobs")
+            if counts is None:
+                counts = self._counts["jobs"] = self._jobs.counts()
+        for status, count in counts.items():
             family.add_metric((status,), count)
         yield family
 
@@ -80,7 +91,7 @@ def check_ready(request: Request) -> Health:
     """
     service = service_of(request)
     try:
-        service.jobs.counts()
+        service.jobs.records.page(limit=1)
         service.store.boundaries_page(limit=1)
     except SQLAlchemyError as error:
         raise Problem(HTTPStatus.SERVICE_UNAVAILABLE, "the store or the database cannot be read") from error

@@ -8,6 +8,7 @@ from pydantic import TypeAdapter
 from api.http.paging import CollectionPage
 from api.jobs.submissions import PresetDocument, estimate
 from api.routes.service import Reader
+from api.settings import Settings
 from ensemble.config.documents import preset_document, preset_names
 from ensemble.questions import preset_question
 from solver.scene.arrangement import Arrangement
@@ -27,11 +28,11 @@ def list_presets(reader: Reader) -> CollectionPage[PresetDocument]:
     -------
     CollectionPage
     """
-    maximum_cost = reader.service.settings.maximum_cost
-    return CollectionPage(items=[_preset(name, maximum_cost) for name in preset_names()], next=None)
+    settings = reader.service.settings
+    return CollectionPage(items=[_preset(name, settings) for name in preset_names()], next=None)
 
 
-def _preset(name: str, maximum_cost: float) -> PresetDocument:
+def _preset(name: str, settings: Settings) -> PresetDocument:
     question = preset_question(name, {})
     document = question.fields
     arrangement = preset_document(name).get("arrangement")
@@ -42,5 +43,8 @@ def _preset(name: str, maximum_cost: float) -> PresetDocument:
         document = {key: value for key, value in document.items() if key != "vesicles"}
         document["arrangement"] = complete
     return PresetDocument(
-        name=name, kind=question.kind, document=document, estimate=estimate(question, maximum_cost)
+        name=name,
+        kind=question.kind,
+        document=document,
+        estimate=estimate(question, settings.maximum_cost, settings.maximum_recorded),
     )

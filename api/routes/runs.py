@@ -6,28 +6,26 @@ from http import HTTPStatus
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Request, Response
+from pydantic import StringConstraints
 
-from api.http.caching import IMMUTABLE, NOT_MODIFIED, cached_response, etag, json_response
+from api.http.caching import IMMUTABLE, JSON, NOT_MODIFIED, cached_response, etag, json_response
 from api.http.paging import After, CollectionPage, Limit, Where, page_response
 from api.http.problems import documented
 from api.results.flow_field import FlowField, flow_field
-from api.results.run_arrays import (
-    FramesDocument,
-    SeriesDocument,
-    frames_bytes,
-    frames_document,
-    select_frames,
-    series_document,
-)
+from api.results.run_arrays import FramesDocument, FrameSelection, SeriesDocument, SeriesSelection, centers
 from api.routes.service import Reader
+from api.routes.streaming import stream
 from ensemble.store.run_record import RunSummary
 
 BINARY = "application/octet-stream"
-MAXIMUM_FRAME = 1_000_000_000
+MAXIMUM_NUMBER = 1_000_000_000
 
 router = APIRouter(prefix="/runs", tags=["runs"])
 
 RunKey = Annotated[str, Path(pattern="^[0-9a-f]{32}$", description="Key of the run.")]
+Start = Annotated[int, Query(ge=0, le=MAXIMUM_NUMBER, description="Number of the first one.")]
+Stop = Annotated[int, Query(ge=0, le=MAXIMUM_NUMBER, description="Number of the one after the last.")]
+Stride = Annotated[int, Query(ge=1, le=MAXIMUM_NUMBER, description="Step from one to the next.")]
 RUN_RESPONSES: dict[int | str, dict[str, Any]] = NOT_MODIFIED | documented(HTTPStatus.NOT_FOUND)
 FRAMES_RESPONSE: dict[int | str, dict[str, Any]] = {
     HTTPStatus.OK.value: {
@@ -97,10 +95,14 @@ def get_series(
     reader: Reader,
     key: RunKey,
     name: Annotated[
-        list[str], Query(max_length=50, description="Names of diagnostics; without any, all are given.")
+        list[Annotated[str, StringConstraints(max_length=100)]],
+        Query(max_length=50, description="Names of diagnostics; without any, all are given."),
     ] = [],  # noqa: B006
+    start: Start = 0,
+    stop: Stop = MAXIMUM_NUMBER,
+    stride: Stride = 1,
 ) -> Response:
-    """Give the diagnostics of a run over time.
+    """Give the diagnostics of a run over time; of a long run some of the records.
 
     Parameters
     ----------
@@ -109,6 +111,8 @@ def get_series(
     key : str
     name : list of str
         Names of diagnostics; all if it is empty.
+    start, stop, stride : int
+        Numbers of the records, as in `range`.
 
     Returns
     -------
@@ -118,12 +122,20 @@ def get_series(
     ------
     NotStored
         If there is no run of this key.
+    BadInput
+        If there is no diagnostic of a name, or there are too many records for one answer.
     """
 
     def make() -> Response:
-        return json_response(series_document(reader.service.store.load(key), name))
+        service = reader.service
+        numbers = range(start, stop, stride)
+        selection = SeriesSelection.of(
+            service.store.arrays(key), name, numbers, service.settings.frame_values
+        )
+        return stream(reader, request, selection.json(), JSON)
 
-    return cached_response(request, etag(key, "series", *sorted(name)), IMMUTABLE, make)
+    tag = etag(key, "series", *sorted(name), f"{start}:{stop}:{stride}")
+    return cached_response(request, tag, IMMUTABLE, make)
 
 
 @router.get("/{key}/frames", response_model=FramesDocument, responses=RUN_RESPONSES | FRAMES_RESPONSE)
@@ -131,11 +143,9 @@ def get_frames(
     request: Request,
     reader: Reader,
     key: RunKey,
-    start: Annotated[int, Query(ge=0, le=MAXIMUM_FRAME, description="Number of the first frame.")] = 0,
-    stop: Annotated[
-        int, Query(ge=0, le=MAXIMUM_FRAME, description="Number of the frame after the last.")
-    ] = MAXIMUM_FRAME,
-    stride: Annotated[int, Query(ge=1, le=MAXIMUM_FRAME, description="Step from frame to frame.")] = 1,
+    start: Start = 0,
+    stop: Stop = MAXIMUM_NUMBER,
+    stride: Stride = 1,
 ) -> Response:
     """Give the recorded states of a run.
 
@@ -159,11 +169,14 @@ def get_frames(
     is_binary = BINARY in request.headers.get("accept", "")
 
     def make() -> Response:
-        run = reader.service.store.load(key)
-        states = select_frames(run, range(start, stop, stride), reader.service.settings.frame_values)
-        if is_binary:
-            return Response(frames_bytes(states), media_type=BINARY)
-        return json_response(frames_document(states))
+        service = reader.service
+        arrays, most = service.store.arrays(key), service.settings.frame_values
+        selection = FrameSelection.of(arrays, range(start, stop, stride), most)
+        if not is_binary:
+            return stream(reader, request, selection.json(), JSON)
+        response = stream(reader, request, selection.binary(), BINARY)
+        response.headers["Content-Length"] = str(selection.size)
+        return response
 
     tag = etag(key, "frames", f"{start}:{stop}:{stride}:{is_binary}")
     return cached_response(request, tag, IMMUTABLE, make)
@@ -190,7 +203,8 @@ def get_flow(request: Request, reader: Reader, key: RunKey) -> Response:
     """
 
     def make() -> Response:
-        field = flow_field(reader.service.store.load(key))
+        arrays = reader.service.store.arrays(key)
+        field = flow_field(arrays.summary.scene, centers(arrays))
         return json_response("null" if field is None else field)
 
     return cached_response(request, etag(key, "flow"), IMMUTABLE, make)

@@ -11,8 +11,10 @@ from fastapi.openapi.models import HTTPBearer
 from fastapi.security.base import SecurityBase
 
 from api.auth import TokenScope
-from api.auth.authentication import Authentication
+from api.auth.authentication import Authentication, Identity
+from api.auth.tokens import Tokens
 from api.database.service_database import LookUp
+from api.http.rate_limits import RateLimits
 from api.jobs.job_queue import Jobs
 from api.jobs.submissions import Submissions
 from api.settings import Settings
@@ -34,7 +36,10 @@ class Service:
         Checks submitted documents.
     watched_jobs : TTLCache
         Recently read jobs by their identifiers, shared by all clients that listen to events.
+    tokens : Tokens
+    limits : RateLimits
     authentication : Authentication
+        Of requests, by the tokens.
     look_up : LookUp
         How coroutines read single records.
     """
@@ -44,17 +49,37 @@ class Service:
     jobs: Jobs
     submissions: Submissions
     watched_jobs: TTLCache[str, Record]
+    tokens: Tokens
+    limits: RateLimits
     authentication: Authentication
     look_up: LookUp
 
 
 @dataclass(frozen=True)
 class Caller:
-    """The user who makes a request, the scope of the request, and the service that answers it."""
+    """The user who makes a request, and the service that answers it."""
 
-    user: str
-    scope: TokenScope
+    identity: Identity
     service: Service
+
+    @property
+    def user(self) -> str:
+        """Name of the user."""
+        return self.identity.user
+
+    @property
+    def scope(self) -> TokenScope:
+        """What the request allows."""
+        return self.identity.scope
+
+    async def is_valid(self) -> bool:
+        """Tell whether the user would still be let in: a long answer ends with its token.
+
+        Returns
+        -------
+        bool
+        """
+        return await self.service.authentication.is_valid(self.identity)
 
 
 def service_of(request: Request) -> Service:
@@ -107,7 +132,7 @@ class RequiredScope(SecurityBase):
         """
         service = service_of(request)
         identity = await service.authentication.authorize(request, self._scope)
-        return Caller(identity.user, identity.scope, service)
+        return Caller(identity, service)
 
 
 Reader = Annotated[Caller, Depends(RequiredScope(TokenScope.READ))]

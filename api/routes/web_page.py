@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import gzip
+import hashlib
+from functools import lru_cache
+from http import HTTPStatus
+from importlib.metadata import version
 from importlib.resources import files
+from mimetypes import guess_type
 from pathlib import Path
 
-from fastapi import FastAPI
+from fastapi import FastAPI, Request, Response
 from fastapi.responses import FileResponse
-from starlette.middleware.gzip import GZipMiddleware
-from starlette.staticfiles import StaticFiles
+from starlette.exceptions import HTTPException
 
 STATIC = Path(str(files("api") / "static"))
 
@@ -32,6 +37,11 @@ CONTENT_SECURITY_POLICY = "; ".join(
 
 
 WEB_PAGE_HEADERS = {"Content-Security-Policy": CONTENT_SECURITY_POLICY, "Cache-Control": "no-cache"}
+# The address of an asset contains a digest of all assets, so what is at an address never changes.
+ASSET_HEADERS = {"Cache-Control": "public, max-age=31536000, immutable", "Vary": "Accept-Encoding"}
+ASSETS = {str(path.relative_to(STATIC)): path for path in STATIC.rglob("*") if path.is_file()}
+PAGE = ASSETS.pop("index.html")
+ASSETS["plotly/plotly.min.js"] = PLOTTING / "plotly.min.js"
 
 
 def add_web_page(app: FastAPI) -> None:
@@ -41,10 +51,39 @@ def add_web_page(app: FastAPI) -> None:
     ----------
     app : FastAPI
     """
-    app.add_api_route("/", _get_web_page, include_in_schema=False)
-    app.mount("/assets/plotly", GZipMiddleware(StaticFiles(directory=PLOTTING)))
-    app.mount("/assets", GZipMiddleware(StaticFiles(directory=STATIC)))
+    digest = assets_digest()
+    page = PAGE.read_text(encoding="utf-8").replace('"assets/', f'"assets/{digest}/')
+
+    @app.get("/", include_in_schema=False)
+    async def get_web_page() -> Response:
+        return Response(page, media_type="text/html", headers=WEB_PAGE_HEADERS)
+
+    @app.get("/assets/{of_version}/{name:path}", include_in_schema=False)
+    def get_asset(request: Request, of_version: str, name: str) -> Response:
+        path = ASSETS.get(name)
+        if path is None or of_version != digest:
+            raise HTTPException(HTTPStatus.NOT_FOUND, "there is no such asset")
+        media_type = guess_type(path)[0]
+        if "gzip" not in request.headers.get("accept-encoding", ""):
+            return FileResponse(path, headers=ASSET_HEADERS, media_type=media_type)
+        headers = ASSET_HEADERS | {"Content-Encoding": "gzip"}
+        return Response(_compressed(path), headers=headers, media_type=media_type)
 
 
-async def _get_web_page() -> FileResponse:
-    return FileResponse(STATIC / "index.html", headers=WEB_PAGE_HEADERS)
+def assets_digest() -> str:
+    """Return a digest of the assets, which are Plotly of the installed version and files of this package.
+
+    Returns
+    -------
+    str
+    """
+    digest = hashlib.sha256(version("plotly").encode())
+    for name in sorted(ASSETS.keys() - {"plotly/plotly.min.js"}):
+        digest.update(f"{name}\0".encode() + ASSETS[name].read_bytes())
+    return digest.hexdigest()[:16]
+
+
+@lru_cache(None)
+def _compressed(path: Path) -> bytes:
+    """Return an asset compressed; each is compressed once, whoever asks for it how often."""
+    return gzip.compress(path.read_bytes(), mtime=0)

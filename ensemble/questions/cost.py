@@ -12,6 +12,9 @@ from solver.scene import Scene
 MOST_RECORDS = 1_000_000
 MOST_RECORDED_POINTS = 100_000_000
 
+_ENDS = 2  # the first and the last state are recorded whatever the interval
+_SERIES = 32  # diagnostics of a run, more than there are
+_VESICLE_SERIES = 8  # numbers of diagnostics of each vesicle, more than there are
 _AUTOMATIC_POINTS = 128  # what "auto" is counted as: most scenes end with fewer
 _CONTRAST = 8.0  # how much longer a step takes with a viscosity contrast: at 64 points 5 to 9 times, measured
 
@@ -26,10 +29,13 @@ class Cost:
         How many runs.
     work : float
         Points × vesicles × time to simulate, over all runs.
+    recorded : float
+        Numbers that are recorded, over all runs.
     """
 
     runs: int
     work: float
+    recorded: float
 
 
 def total_cost(planned_runs: Iterable[tuple[Scene, int]]) -> Cost:
@@ -49,12 +55,13 @@ def total_cost(planned_runs: Iterable[tuple[Scene, int]]) -> Cost:
     ValueError
         If a run would record more than it may; names the interval and its least value.
     """
-    runs, work = 0, 0.0
+    runs, work, recorded = 0, 0.0, 0.0
     for scene, count in planned_runs:
         _limit_output(scene)
         runs += count
         work += count * run_work(scene)
-    return Cost(runs, work)
+        recorded += count * recorded_numbers(scene)
+    return Cost(runs, work, recorded)
 
 
 def run_work(scene: Scene) -> float:
@@ -76,6 +83,25 @@ def run_work(scene: Scene) -> float:
     if any(vesicle.viscosity_contrast != 1 for vesicle in scene.vesicles):
         time *= _CONTRAST
     return float(_points(scene) * time)
+
+
+def recorded_numbers(scene: Scene) -> float:
+    """Return how many numbers a run records that goes on to the end of its extended horizon.
+
+    Parameters
+    ----------
+    scene : Scene
+        That is run.
+
+    Returns
+    -------
+    float
+        Diagnostics of every record, and positions and tensions of every recorded state.
+    """
+    time, vesicles, output = scene.horizon * scene.criteria.extensions, len(scene.vesicles), scene.output
+    records = time / output.interval + _ENDS
+    frames = min(time / output.frame_interval + _ENDS, records)
+    return records * (_SERIES + _VESICLE_SERIES * vesicles) + frames * (1 + 2 * (_points(scene) + vesicles))
 
 
 def _points(scene: Scene) -> int:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import zarr
@@ -75,27 +77,118 @@ def _summary(directory: Path, group: zarr.Group) -> RunSummary:
         raise StoreError(f"run {directory.name}: unreadable attributes ({first_problem(error)})") from error
 
 
-def _reader(directory: Path, group: zarr.Group) -> Callable[[str], Array]:
-    def read(name: str) -> Array:
-        place = f"run {directory.name}: array {name}"
+class StoredArrays:
+    """The arrays of a run, of which only the rows that are asked for are read.
+
+    Parameters
+    ----------
+    directory : Path
+        Of the run.
+
+    Attributes
+    ----------
+    summary : RunSummary
+
+    Raises
+    ------
+    StoreError
+        If there is no readable group, or its attributes are not those of a run.
+    """
+
+    def __init__(self, directory: Path) -> None:
+        self._directory = directory
+        self._group = _open(directory)
+        self._arrays: dict[str, zarr.Array[Any]] = {}
+        self.summary = _summary(directory, self._group)
+
+    def shape(self, name: str) -> tuple[int, ...]:
+        """Return the shape of an array: first the number of its rows, which are samples or frames.
+
+        Parameters
+        ----------
+        name : str
+
+        Returns
+        -------
+        tuple of int
+
+        Raises
+        ------
+        StoreError
+            If the array is missing, incomplete or damaged.
+        """
+        return tuple(self._array(name).shape)
+
+    def rows(self, name: str, numbers: range) -> Array:
+        """Read some rows of an array.
+
+        Parameters
+        ----------
+        name : str
+        numbers : range
+            Ascending numbers of rows that exist.  Chunks without any of them are not read.
+
+        Returns
+        -------
+        (rows, ...)
+
+        Raises
+        ------
+        StoreError
+            If the array is missing, incomplete or damaged.
+        """
+        array = self._array(name)
+        at_once = (array.shards or array.chunks)[0]
+        found = []
+        while numbers:
+            end = (numbers[0] // at_once + 1) * at_once
+            count = len(range(numbers[0], min(end, numbers.stop), numbers.step))
+            here, numbers = numbers[:count], numbers[count:]
+            found.append(self._read(name, slice(here[0], here[-1] + 1, here.step)))
+        return np.concatenate(found) if found else np.empty((0, *array.shape[1:]))
+
+    def whole(self, name: str) -> Array:
+        """Read all of an array; see `rows`.
+
+        Parameters
+        ----------
+        name : str
+
+        Returns
+        -------
+        array
+        """
+        self._array(name)
+        return self._read(name, ...)
+
+    def _array(self, name: str) -> zarr.Array[Any]:
+        if name not in self._arrays:
+            with self._decoding(name) as place:
+                array = self._group[name]
+                if not isinstance(array, zarr.Array):
+                    raise StoreError(f"{place} is not an array")
+                missing = array.nchunks - array.nchunks_initialized if array.size else 0
+                if missing:  # it would be read as fill values
+                    raise StoreError(f"{place} has lost {missing} of {array.nchunks} chunks")
+                self._arrays[name] = array
+        return self._arrays[name]
+
+    def _read(self, name: str, selection: Any) -> Array:
+        with self._decoding(name):
+            return np.asarray(self._arrays[name][selection], dtype=np.float64)
+
+    @contextmanager
+    def _decoding(self, name: str) -> Iterator[str]:
+        place = f"run {self._directory.name}: array {name}"
         # Metadata and codecs fail in many ways (zarr, numcodecs, JSON); all of them mean the same here.
         try:
-            array = group[name]
-            if not isinstance(array, zarr.Array):
-                raise StoreError(f"{place} is not an array")
-            missing = array.nchunks - array.nchunks_initialized if array.size else 0
-            values = np.asarray(array[...], dtype=np.float64)
+            yield place
         except StoreError:
             raise
         except KeyError as error:
             raise StoreError(f"{place} is missing") from error
         except Exception as error:
             raise StoreError(f"{place} cannot be decoded ({error})") from error
-        if missing:
-            raise StoreError(f"{place} has lost {missing} of {array.nchunks} chunks")
-        return values
-
-    return read
 
 
 def read_summary(directory: Path) -> RunSummary:
@@ -135,5 +228,5 @@ def read_run(directory: Path) -> Run:
     StoreError
         If an array is missing, incomplete or damaged, or the attributes are not those of a run.
     """
-    group = _open(directory)
-    return rebuild(_summary(directory, group), _reader(directory, group))
+    stored = StoredArrays(directory)
+    return rebuild(stored.summary, stored.whole)

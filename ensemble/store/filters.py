@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import operator
 import re
+import reprlib
 import types
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, is_dataclass
@@ -32,7 +33,8 @@ COMPARISONS = {
     ">=": operator.ge,
 }
 EQUALITIES = ("=", "!=")
-PATTERN = re.compile(r"\s*(?P<path>\w+(?:\.\w+)*)\s*(?P<sign><=|>=|!=|=|<|>)\s*(?P<value>[^\s=<>].*?)\s*")
+PATH = re.compile(r"\w+(?:\.\w+)*")
+_SIGN = re.compile(r"<=|>=|!=|=|<|>")
 # The names that databases have for the types of JSON.
 NUMBERS = ("number", "integer", "real")
 BOOLEANS = ("boolean", "integer")  # SQLite reads true and false as 1 and 0
@@ -193,6 +195,19 @@ def _is_group(kind: Any) -> bool:
     return is_model or is_dataclass(kind) or get_origin(kind) in (list, tuple, dict)
 
 
+def _parts(text: str) -> tuple[str, str, str]:
+    """Split a filter into path, sign and value, in a time proportional to its length."""
+    sign = _SIGN.search(text)
+    if sign is not None:
+        path, value = text[: sign.start()].strip(), text[sign.end() :].strip()
+        # PostgreSQL knows no text with a null character.
+        if PATH.fullmatch(path) and value and value[0] not in "=<>" and not {"\n", "\0"} & set(value):
+            return path, sign[0], value
+    raise StoreInputError(
+        f"where: {reprlib.repr(text)} is not of the form path op value, op one of = != < <= > >="
+    )
+
+
 def condition(text: str, document: InstrumentedAttribute[Any], fields: Fields) -> ColumnElement[bool]:
     """Turn a filter into a condition on a JSON column.
 
@@ -216,10 +231,7 @@ def condition(text: str, document: InstrumentedAttribute[Any], fields: Fields) -
     StoreInputError
         If the filter is malformed, the field is unknown, or the value does not have its type.
     """
-    match = PATTERN.fullmatch(text)
-    if match is None or "\0" in text:  # PostgreSQL knows no text with one
-        raise StoreInputError(f"where: {text!r} is not of the form path op value, op one of = != < <= > >=")
-    path, sign, value = match["path"], match["sign"], match["value"]
+    path, sign, value = _parts(text)
     field = _resolve(path, fields)
     element, compare = document[field.location], COMPARISONS[sign]
     if value == "null" and sign in EQUALITIES:

@@ -14,7 +14,7 @@ import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, closing, contextmanager
 from pathlib import Path
-from typing import Self, TypeVar
+from typing import TYPE_CHECKING, Self, TypeVar
 
 from pydantic import ValidationError
 from sqlalchemy.exc import DatabaseError
@@ -29,6 +29,9 @@ from ensemble.store.run_record import RunSummary, first_problem
 from ensemble.store.sql_database import CATALOG, PLACE, UNUSABLE, Place, is_file, reason
 from ensemble.store.staging import STAGING, STORE_LOCK, RunStaging, Staged
 from solver.analysis.run import Outcome, Run
+
+if TYPE_CHECKING:
+    from ensemble.store.archive import StoredArrays
 
 COMMIT_SECONDS = 60  # for which a commit is tried again while the database or the disk does not answer
 
@@ -432,6 +435,29 @@ class Store(AbstractContextManager["Store"]):
         if not self.contains(key):
             raise NotStored(f"run: there is no run {key} in {self.path}")
         return read_run(self._runs / key)
+
+    def arrays(self, key: str) -> StoredArrays:
+        """Open the arrays of a committed run, to read some of their rows.
+
+        Parameters
+        ----------
+        key : str
+
+        Returns
+        -------
+        StoredArrays
+
+        Raises
+        ------
+        NotStored
+            If there is no such run.
+        StoreError
+            If its files are damaged.
+        """
+        from ensemble.store.archive import StoredArrays
+
+        self.run_record(key)
+        return StoredArrays(self._runs / key)
 
     def summaries(self, where: Sequence[str] = ()) -> list[RunSummary]:
         """Return the summaries of the runs that meet all filters, oldest first.

@@ -63,7 +63,9 @@ def send_generated_requests(directory: Path, *options: str, seconds: float) -> G
     command += ["--exclude-checks=use_after_free"]
     # Events end with the job, and no worker runs it here.
     command += ["--exclude-path-regex=/events$", f"--header=Authorization: Bearer {token}", *options]
-    unlimited = {"request_rate": "1000000/second", "refusal_rate": "1000000/second", "maximum_jobs": 10**6}
+    unlimited = {"maximum_jobs": 10**6} | {
+        f"{what}_rate": "1000000/second" for what in ("request", "submission", "refusal")
+    }
     with serving(store, **unlimited) as address:
         done = subprocess.run(
             [*command, f"{address}/openapi.json"],

@@ -12,7 +12,7 @@ from typing import Any
 import httpx
 import numpy as np
 import pytest
-from playwright.sync_api import Browser, ConsoleMessage, Page, expect, sync_playwright
+from playwright.sync_api import Browser, ConsoleMessage, Page, Response, expect, sync_playwright
 
 from api.auth import TokenScope
 from ensemble.config.documents import load_study
@@ -244,7 +244,10 @@ def test_the_player_obeys_the_keyboard(page: Page, url: str, run_path: str, run:
 
 def test_states_between_frames_are_cubic(page: Page, url: str) -> None:
     page.goto(url)
-    weights = "async time => (await import('/assets/frames.js')).hermiteWeights([0, 1, 2, 3], time)"
+    weights = """async time => {
+        const { hermiteWeights } = await import(document.scripts[0].src.replace('main', 'frames'));
+        return hermiteWeights([0, 1, 2, 3], time);
+    }"""
     for time in (1.0, 1.25, 1.9):
         values = page.evaluate(weights, time)
         assert sum(values) == pytest.approx(1)
@@ -256,7 +259,7 @@ def test_the_flow_is_known_between_and_beyond_the_places_where_it_was_sampled(
 ) -> None:
     page.goto(url)
     velocities = """async ([key, places]) => {
-        const { ImposedFlow } = await import('/assets/flow.js');
+        const { ImposedFlow } = await import(document.scripts[0].src.replace('main', 'flow'));
         const flow = await ImposedFlow.of(key, new AbortController().signal);
         return places.map(([x, y]) => flow.at(x, y));
     }"""
@@ -271,13 +274,39 @@ def test_a_long_run_is_fetched_in_several_requests(page: Page, url: str, run: Ru
     page.goto(url)
     summary = httpx.get(f"{url}/runs/{run_key(run.scene)}").json()
     frames = """async ([run, most]) => {
-        const { Frames } = await import('/assets/frames.js');
+        const { Frames } = await import(document.scripts[0].src.replace('main', 'frames'));
         const { states } = await Frames.of(run, new AbortController().signal, most);
         return states.map(({ time, membranes }) => [time, membranes[1].tension.at(-1)]);
     }"""
     whole = page.evaluate(frames, [summary, 500_000])
     assert [time for time, _ in whole] == pytest.approx(run.frames.time.tolist())
     assert page.evaluate(frames, [summary, 5000]) == whole
+
+
+def test_of_a_long_run_some_records_are_fetched(page: Page, url: str, run: Run) -> None:
+    page.goto(url)
+    series = """async ([key, most]) => {
+        const { seriesOf } = await import(document.scripts[0].src.replace('main', 'series'));
+        return (await seriesOf(key, new AbortController().signal, most)).time;
+    }"""
+    times = run.series["time"].tolist()
+    assert page.evaluate(series, [run_key(run.scene), 500_000]) == pytest.approx(times)
+    assert page.evaluate(series, [run_key(run.scene), len(times) * len(run.series) // 3]) == pytest.approx(
+        times[::3]
+    )
+
+
+def test_scripts_are_loaded_once_and_kept(page: Page, url: str) -> None:
+    """Their addresses contain a digest, so a browser may keep them for ever."""
+    scripts: list[Response] = []
+    page.on("response", lambda answer: scripts.append(answer) if "/assets/" in answer.url else None)
+    page.goto(url)
+    page.locator(".plot .main-svg").first.wait_for()
+    assert len(scripts) > 10
+    for script in scripts:
+        assert script.headers["cache-control"] == "public, max-age=31536000, immutable", script.url
+    assert httpx.get(f"{url}/assets/{'0' * 16}/main.js").status_code == 404
+    assert httpx.get(url).headers["cache-control"] == "no-cache"
 
 
 def test_any_field_may_be_changed(page: Page, url: str) -> None:

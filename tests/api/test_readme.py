@@ -165,6 +165,8 @@ def settings_table() -> list[str]:
 def _written(default: Any) -> str:
     if default is None:
         return "files in the store"
+    if default == "":
+        return "none"
     return (
         f"{default:g}" if isinstance(default, float) and default >= 1e6 else f"{default}".removesuffix(".0")
     )

@@ -40,7 +40,11 @@ from tests.api.stores import fill
 BATCH = 5000
 CONNECTIONS = 32
 SETTLE_SECONDS = 8  # in which the server has warmed up and the job has begun to compute
-UNLIMITED = {"ENSEMBLE_REQUEST_RATE": "1000000/second", "ENSEMBLE_MAXIMUM_JOBS": "10000000"}
+UNLIMITED = {
+    "ENSEMBLE_REQUEST_RATE": "1000000/second",
+    "ENSEMBLE_SUBMISSION_RATE": "1000000/second",
+    "ENSEMBLE_MAXIMUM_JOBS": "10000000",
+}
 ENDLESS = {"preset": "critical-hamaker", "set": {"search.tolerance": 1e-6}, "ranks": 1}
 POST = """
 wrk.method = "POST"

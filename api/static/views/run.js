@@ -11,6 +11,7 @@ import { outcomeLabel } from "../outcomes.js";
 import { Player } from "../player.js";
 import { Plot } from "../plot.js";
 import { keepInAddress } from "../router.js";
+import { seriesOf } from "../series.js";
 import { describe } from "../symbols.js";
 
 /** @param {import("../router.js").Place} place */
@@ -33,10 +34,10 @@ export async function showRun({ content, parameters, query, signal }) {
   );
 
   const loading = stage.appendChild(element("p", { class: "note", role: "status" }, "Loading the states…"));
-  const [frames, flow, { series }] = await Promise.all([
+  const [frames, flow, series] = await Promise.all([
     Frames.of(run, signal),
     ImposedFlow.of(key, signal),
-    get(`/runs/${key}/series`, signal),
+    seriesOf(key, signal),
   ]);
   loading.remove();
   const plot = new Plot(plots, signal);

@@ -198,10 +198,18 @@ class SubmissionForm {
     }
   }
 
-  /** @param {{runs: number, cost: number, maximum: number, accepted: boolean}} estimate */
-  #showCost({ runs, cost, maximum, accepted }) {
+  /**
+   * @param {{runs: number, cost: number, maximum: number, recorded: number, most_recorded: number,
+   *   accepted: boolean}} estimate
+   */
+  #showCost({ runs, cost, maximum, recorded, most_recorded, accepted }) {
     const count = runs === 1 ? "One run" : `At most ${runs} runs`;
     const share = `cost ${number(cost, 2)} of ${number(maximum, 2)} allowed (points × vesicles × time)`;
+    if (recorded > most_recorded) {
+      const records = `records ${number(recorded, 2)} numbers of ${number(most_recorded, 2)} allowed`;
+      this.cost.textContent = `Too large: ${records}. Raise the intervals of the output.`;
+      return;
+    }
     this.cost.textContent = accepted ? `${count}, ${share}.` : `Too large: ${share}.`;
     this.submit.disabled = !accepted;
     this.#mark("");

@@ -4,19 +4,36 @@ from __future__ import annotations
 
 import subprocess
 from collections.abc import Callable
-from datetime import timedelta
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import httpx
 import pytest
+from sqlalchemy import update
 
 from api.auth import TokenScope
 from api.auth.authentication import is_loopback
+from api.auth.tokens import Tokens
+from api.database.database_tables import TokenRow
+from api.database.service_database import Database
+from api.settings import Settings
 from tests.api.servers import client_of, make_token, serving
 
 SUBMISSION = {"preset": "doublet-shear"}
 PROTECTED = ["/jobs", "/runs", "/boundaries", "/presets", "/metrics"]
 PUBLIC = ["/healthz", "/readyz", "/openapi.json"]
+
+
+def revoke(store: Path, token: str) -> None:
+    with Database.open(Settings(store=store).database_url, store) as database:
+        Tokens(database).revoke(token.split(".")[0])
+
+
+def expire(store: Path, token: str) -> None:
+    """Let a token expire now."""
+    expired = update(TokenRow).where(TokenRow.id == token.split(".")[0]).values(expires=datetime.now(UTC))
+    with Database.open(Settings(store=store).database_url, store) as database, database.begin() as connection:
+        connection.execute(expired)
 
 
 def bearer(token: str) -> dict[str, str]:
@@ -114,14 +131,136 @@ def test_only_the_whole_token_is_accepted(store):
         assert client.get("/jobs", headers=bearer(token)).status_code == 200
 
 
-def test_guessing_tokens_is_limited(store):
+def guess(client: httpx.Client, times: int, **headers: str) -> list[int]:
+    """Return the statuses of answers to so many invalid tokens."""
+    answers = [client.get("/jobs", headers=bearer(f"guess.{number}") | headers) for number in range(times)]
+    assert all(0 < int(each.headers["retry-after"]) <= 60 for each in answers if each.status_code == 429)
+    return [answer.status_code for answer in answers]
+
+
+def test_guessing_tokens_is_limited_and_never_stops_a_good_token(store):
     token = make_token(store, "ada", TokenScope.READ)
     with client_of(store, refusal_rate="5/minute") as client:
-        statuses = [client.get("/jobs", headers=bearer(f"guess.{number}")).status_code for number in range(8)]
-        assert statuses == [401] * 5 + [429] * 3
-        refused = client.get("/jobs", headers=bearer(token))
-        assert refused.status_code == 429, "now the valid token is refused as well"
-        assert 0 < int(refused.headers["retry-after"]) <= 60
+        assert guess(client, 8) == [401] * 5 + [429] * 3
+        assert client.get("/jobs", headers=bearer(token)).status_code == 200
+
+
+def test_guesses_are_counted_by_the_address_that_a_trusted_proxy_gives(store):
+    make_token(store, "ada", TokenScope.READ)
+    with client_of(store, refusal_rate="2/minute", trusted_proxies="127.0.0.0/8") as client:
+        assert guess(client, 3, **{"X-Forwarded-For": "203.0.113.7"}) == [401, 401, 429]
+        assert guess(client, 1, **{"X-Forwarded-For": "203.0.113.8"}) == [401]
+        # What the client itself has put before the address that the proxy adds does not count.
+        assert guess(client, 1, **{"X-Forwarded-For": "203.0.113.9, 203.0.113.7"}) == [429]
+
+
+def test_guesses_from_one_network_are_counted_together(store):
+    """Whoever has one address of IPv6 has 2⁶⁴ of them."""
+    make_token(store, "ada", TokenScope.READ)
+    with client_of(store, refusal_rate="2/minute", trusted_proxies="127.0.0.1") as client:
+        statuses = [guess(client, 1, **{"X-Forwarded-For": f"2001:db8::{host}"}) for host in range(1, 4)]
+        assert statuses == [[401], [401], [429]]
+        assert guess(client, 1, **{"X-Forwarded-For": "2001:db8:0:1::1"}) == [401]
+
+
+def test_what_an_untrusted_client_forwards_does_not_change_its_address(store):
+    make_token(store, "ada", TokenScope.READ)
+    with client_of(store, refusal_rate="2/minute") as client:
+        forwarded = [guess(client, 1, **{"X-Forwarded-For": f"203.0.113.{host}"}) for host in range(3)]
+        assert forwarded == [[401], [401], [429]]
+
+
+def test_requests_that_the_scope_forbids_are_counted_too(store):
+    token = make_token(store, "ada", TokenScope.READ)
+    with client_of(store, request_rate="3/minute") as client:
+        statuses = [
+            client.post("/jobs", json=SUBMISSION, headers=bearer(token)).status_code for _ in range(5)
+        ]
+        assert statuses == [403] * 3 + [429] * 2
+
+
+def test_the_first_token_closes_a_running_service(store):
+    with client_of(store) as client:
+        assert client.post("/jobs", json=SUBMISSION).status_code == 202
+        token = make_token(store, "ada", TokenScope.READ)
+        assert [client.get(path).status_code for path in PROTECTED] == [401] * len(PROTECTED)
+        assert client.post("/jobs", json=SUBMISSION).status_code == 401
+        assert client.get("/jobs", headers=bearer(token)).status_code == 200
+        assert client.post("/jobs", json=SUBMISSION, headers=bearer(token)).status_code == 403
+
+
+def test_a_service_stays_closed_after_its_last_token_was_revoked(store):
+    with serving(store) as address:
+        token = make_token(store, "ada", TokenScope.ADMIN)
+        revoke(store, token)
+        assert httpx.get(f"{address}/jobs").status_code == 401
+        assert httpx.get(f"{address}/jobs", headers=bearer(token)).status_code == 401
+    with client_of(store) as started_again:
+        assert started_again.get("/jobs").status_code == 401
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        {"X-Forwarded-For": "203.0.113.7"},
+        {"Forwarded": "for=203.0.113.7"},
+        {"X-Real-IP": "203.0.113.7"},
+        {"X-Forwarded-Host": "vesicles.example"},
+        {"Via": "1.1 proxy"},
+        {"CF-Connecting-IP": "203.0.113.7"},
+    ],
+    ids=lambda header: next(iter(header)),
+)
+@pytest.mark.parametrize("trusted", ["", "127.0.0.1"])
+def test_without_tokens_a_request_that_a_proxy_forwards_is_refused(store, header, trusted):
+    with client_of(store, trusted_proxies=trusted) as client:
+        response = client.post("/jobs", json=SUBMISSION, headers={"Host": "127.0.0.1"} | header)
+        assert response.status_code == 421
+        assert next(iter(header)).lower() in response.json()["detail"].lower()
+        assert client.get("/jobs").json()["items"] == []
+
+
+OTHER_SITES: list[dict[str, str]] = [
+    {"Sec-Fetch-Site": "cross-site"},
+    {"Sec-Fetch-Site": "same-site"},
+    {"Origin": "https://evil.example"},
+    {"Origin": "http://localhost:1"},
+    {"Origin": "null"},
+]
+COSTLY = [*PROTECTED, "/runs?where=outcome=bound", "/kinds", "/flows", f"/runs/{'0' * 32}/frames"]
+
+
+@pytest.mark.parametrize("headers", OTHER_SITES, ids=str)
+def test_pages_of_other_sites_cannot_make_a_service_without_tokens_work(reading, headers):
+    assert [reading.get(path, headers=headers).status_code for path in COSTLY] == [403] * len(COSTLY)
+    assert reading.post("/estimate", json=SUBMISSION, headers=headers).status_code == 403
+
+
+def test_the_page_of_the_service_and_addresses_typed_by_users_are_answered(reading):
+    own = f"http://{reading.base_url.netloc.decode()}"
+    for headers in ({"Sec-Fetch-Site": "same-origin"}, {"Sec-Fetch-Site": "none"}, {"Origin": own}):
+        assert reading.get("/runs", headers=headers).status_code == 200, headers
+
+
+@pytest.mark.parametrize("host", ["127.0.0.2", "127.0.0.2:8000", "[::1]:8000", "LOCALHOST"])
+def test_every_loopback_address_is_this_machine(reading, host):
+    assert reading.get("/jobs", headers={"Host": host}).status_code == 200
+
+
+@pytest.mark.parametrize("ended", ["revoked", "expired", "first token"])
+def test_an_event_stream_ends_with_its_token(store, ended):
+    token = None if ended == "first token" else make_token(store, "ada", TokenScope.SUBMIT)
+    with client_of(store, token, event_seconds=0.1) as client:
+        job = client.post("/jobs", json=SUBMISSION).json()
+        with client.stream("GET", f"/jobs/{job['id']}/events", timeout=60) as events:
+            lines = events.iter_lines()
+            assert next(lines) == "event: job"
+            if token is None:
+                make_token(store, "bob", TokenScope.READ)
+            else:
+                {"revoked": revoke, "expired": expire}[ended](store, token)
+            assert "event: job" not in list(lines), "the stream ends, and says nothing more"
+        assert client.get(f"/jobs/{job['id']}/events").status_code == 401
 
 
 def test_the_database_does_not_hold_the_secret(store):

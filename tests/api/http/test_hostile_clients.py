@@ -9,9 +9,13 @@ from collections.abc import Iterator
 
 import httpx
 import pytest
+from sqlalchemy import Engine, event
 
 from api.auth import TokenScope
 from api.http.middleware import SECURITY_HEADERS
+from ensemble.errors import StoreInputError
+from ensemble.store.catalog import RUN_FIELDS, RunRow
+from ensemble.store.filters import condition
 from tests.api.servers import client_of, make_token
 
 JSON = {"Content-Type": "application/json"}
@@ -107,6 +111,8 @@ def test_bodies_that_are_not_json_documents(unharmed, content):
         {"preset": "critical-hamaker", "set": {"sweep.parameter": "output.interval", "sweep.values": [1e-9]}},
         {"preset": "critical-hamaker", "set": {"search.limits": [5e-324, 1.7e308], "scene.horizon": 1e9}},
         {"preset": "doublet-shear", "set": {f"criteria.{number}": 1 for number in range(10_000)}},
+        {"preset": "doublet-shear", "set": {"vesicles": [[[]]] * 40_000}},
+        {"preset": "doublet-shear", "set": {"output.frame_interval": 2e-4, "criteria.extensions": 100}},
     ],
 )
 def test_excessive_work_is_refused_at_once(unharmed, submission):
@@ -239,7 +245,13 @@ def test_invalid_heads(unharmed, head):
     assert 400 <= status_of(raw(unharmed, head)) < 500
 
 
-def test_headers_of_answers_hold_nothing_that_a_client_sent(submitting):
+def test_headers_of_answers_hold_nothing_that_a_client_sent(store):
+    token = make_token(store, "ada", TokenScope.SUBMIT)
+    with client_of(store, token) as client:
+        _send_injections(client)
+
+
+def _send_injections(submitting: httpx.Client) -> None:
     made = submitting.post(
         "/jobs",
         json={"preset": "doublet-shear"},
@@ -252,6 +264,72 @@ def test_headers_of_answers_hold_nothing_that_a_client_sent(submitting):
         "/jobs", params={"limit": 1, "x": "\r\nX-Injected: 1"}, headers={"Host": "localhost"}
     )
     assert "injected" not in str(listed.headers).lower()
+
+
+@pytest.mark.parametrize(
+    "condition",
+    [
+        "a=b" + " " * 900 + "\n",
+        "a=b" + " " * 31_000 + "\n",
+        " " * 31_000 + "=",
+        "a." * 15_000 + "=1",
+        "=" * 31_000,
+        "flow.rate=" + "9" * 30_000,
+        "flow.rate" + "\t" * 30_000 + "x",
+    ],
+)
+@pytest.mark.parametrize("kind", ["runs", "boundaries"])
+def test_long_filters_are_refused(reading, kind, condition):
+    answer = reading.get(f"/{kind}", params={"where": condition})
+    assert_refused(answer, 422, 400)
+    assert len(answer.content) < 5000
+
+
+@pytest.mark.parametrize(
+    "text", ["a=b" + " " * 1_000_000 + "\n", "a=" + "b " * 500_000 + "\n", " " * 1_000_000]
+)
+def test_filters_are_parsed_in_linear_time(text):
+    begun = time.process_time()
+    with pytest.raises(StoreInputError):
+        condition(text, RunRow.document, RUN_FIELDS)
+    assert time.process_time() - begun < 2.0
+
+
+@pytest.mark.parametrize(
+    "submission",
+    [{"preset": "x" * 200_000}, {"preset": "doublet-shear", "set": {"flow.kind": "x" * 200_000}}],
+)
+def test_what_is_refused_is_not_sent_back_whole(unharmed, submission):
+    answer = unharmed.post("/jobs", json=submission)
+    assert_refused(answer, 422)
+    assert len(answer.content) < 20_000
+
+
+def test_submitting_and_dismissing_is_limited(store):
+    with client_of(store, submission_rate="5/minute", maximum_jobs=2) as client:
+        statuses = []
+        for _ in range(7):
+            made = client.post("/jobs", json={"preset": "doublet-shear"})
+            statuses.append(made.status_code)
+            if made.status_code == 202:
+                client.delete(f"/jobs/{made.json()['id']}")
+        assert statuses == [202] * 5 + [429] * 2
+        assert int(made.headers["retry-after"]) > 0
+
+
+def test_whether_a_service_is_ready_does_not_depend_on_how_many_jobs_it_has(store):
+    """No statement of its check goes through all jobs."""
+    with client_of(store) as client:
+        client.get("/readyz")
+        statements: list[str] = []
+        event.listen(Engine, "before_cursor_execute", lambda *arguments: statements.append(arguments[2]))
+        assert client.get("/readyz").status_code == 200
+        assert statements
+        assert [statement for statement in statements if "count(" in statement] == []
+        counted = len(statements)
+        assert {client.get("/metrics").status_code for _ in range(20)} == {200}
+        counts = [statement for statement in statements[counted:] if "count(" in statement]
+        assert 0 < len(counts) < 10, "the numbers of jobs are kept for some seconds"
 
 
 def test_a_head_that_does_not_arrive_in_time(store):

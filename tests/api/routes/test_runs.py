@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+import shutil
+import socket
+import tracemalloc
 from pathlib import Path
 
 import httpx
 import numpy as np
 import pytest
 
+from api.auth import TokenScope
+from api.auth.tokens import Tokens
+from api.database.service_database import Database
+from api.results.run_arrays import FrameSelection
+from api.settings import Settings
 from ensemble.store import Store
 from solver.analysis.run import Outcome
 from solver.membrane.curve import positions
-from tests.api.servers import client_of
+from tests.api.servers import client_of, make_token
 from tests.api.stores import FRAMES, RATES
 from tests.ensemble.runs import shear_run, shear_scene
 
@@ -109,6 +117,25 @@ def test_series_are_those_of_the_run(reading, filled_store, bound_run):
     assert "weight" in refused.json()["detail"]
 
 
+@pytest.mark.parametrize("query", [{}, {"stride": 3}, {"start": 2, "stop": 7, "stride": 2}, {"start": 10**9}])
+def test_some_records_may_be_chosen(reading, filled_store, bound_run, query):
+    with Store.existing(filled_store) as store:
+        gap = store.load(bound_run).series["gap"]
+    chosen = slice(query.get("start", 0), query.get("stop"), query.get("stride", 1))
+    answer = reading.get(f"/runs/{bound_run}/series", params=query | {"name": "gap"}).json()
+    assert answer == {"series": {"gap": gap[chosen].tolist()}, "total": len(gap)}
+
+
+def test_too_many_records_at_once_are_refused_with_the_number(filled_store, bound_run):
+    with client_of(filled_store, frame_values=8) as client:
+        address = f"/runs/{bound_run}/series"
+        refused = client.get(address, params={"name": ["time", "gap"]})
+        assert refused.status_code == 422
+        assert "at most 4" in refused.json()["detail"]
+        few = client.get(address, params={"name": ["time", "gap"], "stop": 4})
+        assert len(few.json()["series"]["gap"]) == 4
+
+
 def test_frames_as_json_are_points_in_the_plane(reading, filled_store, bound_run):
     with Store.existing(filled_store) as store:
         run = store.load(bound_run)
@@ -197,6 +224,113 @@ def test_tags_of_different_frames_differ(reading, bound_run):
         reading.get(address, params={"start": 2}),
     ]
     assert len({answer.headers["etag"] for answer in answers}) == len(answers)
+
+
+@pytest.fixture(scope="module")
+def long_run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """A store with a run whose arrays have many chunks, and the key of the run."""
+    path = tmp_path_factory.mktemp("long") / "store"
+    with Store.open(path) as store:
+        return path, store.save(shear_run(shear_scene(rate=0.5), seed=1, frames=20_000))
+
+
+def test_only_chunks_that_are_asked_for_are_read(long_run):
+    """The others may even be damaged."""
+    path, key = long_run
+    arrays = path / "runs" / key
+    chunks = sorted((arrays / "tangent_angle" / "c").rglob("0"), key=lambda file: int(file.parts[-3]))
+    assert len(chunks) > 3
+    last = chunks[-1].read_bytes()
+    chunks[-1].write_bytes(b"damaged")
+    try:
+        with client_of(path) as client:
+            for address in (f"/runs/{key}/frames?stop=1", f"/runs/{key}/frames?start=100&stop=200&stride=7"):
+                assert client.get(address).status_code == 200
+                assert client.get(address, headers=BINARY).status_code == 200
+            assert client.get(f"/runs/{key}/flow").status_code == 200
+            assert client.get(f"/runs/{key}/frames?start=19999").status_code == 500
+    finally:
+        chunks[-1].write_bytes(last)
+
+
+def test_answers_about_a_long_run_need_little_memory(long_run):
+    """More than a piece at a time is neither read nor written."""
+    path, key = long_run
+    numbers = range(0, 20_000, 4)
+    with Store.existing(path) as store:
+        selection = FrameSelection.of(store.arrays(key), numbers, 10**9)
+        for pieces in (selection.json(), selection.binary()):
+            tracemalloc.start()
+            size = sum(len(piece) for piece in pieces)
+            (_, peak), _ = tracemalloc.get_traced_memory(), tracemalloc.stop()
+            assert size > 3_000_000
+            assert peak < 16 << 20
+        whole = store.load(key).frames
+        frames = np.frombuffer(b"".join(selection.binary()), dtype="<f4").reshape(len(numbers), -1)
+        assert len(frames[0]) * 4 * len(numbers) == selection.size
+        assert np.array_equal(frames[:, 0], np.float32(whole.time[numbers]))
+        assert np.array_equal(frames[:, -32:], np.float32(whole.tension[numbers, 1]))
+
+
+def test_rows_are_those_of_the_whole_array(long_run):
+    path, key = long_run
+    with Store.existing(path) as store:
+        arrays, frames = store.arrays(key), store.load(key).frames
+    for numbers in (range(0), range(5), range(3, 19_999, 1), range(0, 20_000, 4099), range(19_999, 20_000)):
+        assert np.array_equal(arrays.rows("tangent_angle", numbers), frames.tangent_angle[numbers])
+        assert np.array_equal(arrays.rows("frame_time", numbers), frames.time[numbers])
+
+
+def test_a_lost_chunk_is_an_error_and_not_numbers(long_run):
+    path, key = long_run
+    chunk = min((path / "runs" / key / "tension" / "c").rglob("0"), key=lambda file: int(file.parts[-3]))
+    lost = chunk.read_bytes()
+    chunk.unlink()
+    try:
+        with client_of(path) as client:
+            assert client.get(f"/runs/{key}/frames?start=19999").status_code == 500
+    finally:
+        chunk.write_bytes(lost)
+
+
+@pytest.mark.parametrize("part", ["frames", "frames?stride=2", "series"])
+def test_an_answer_under_way_ends_with_its_token(tmp_path, long_run, part):
+    path, key = long_run
+    store = tmp_path / "store"
+    shutil.copytree(path, store)
+    token = make_token(store, "ada", TokenScope.READ)
+    with client_of(store, token, frame_values=10**8) as client:
+        whole = len(client.get(f"/runs/{key}/{part}", headers={"Accept-Encoding": "identity"}).content)
+        assert whole > 1 << 20
+        parts = client.base_url
+        with socket.socket() as connection:
+            connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 16)
+            connection.settimeout(60)
+            connection.connect((parts.host, parts.port))
+            head = (
+                f"GET /runs/{key}/{part} HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer {token}\r\n\r\n"
+            )
+            connection.sendall(head.encode())
+            received = len(connection.recv(1000))
+            with Database.open(Settings(store=store).database_url, store) as database:
+                Tokens(database).revoke(token.split(".")[0])
+            try:
+                while piece := connection.recv(65536):
+                    received += len(piece)
+            except ConnectionResetError:
+                pass
+        assert received < whole, "the answer is cut off, and the client sees that"
+
+
+def test_long_answers_are_compressed_and_short_ones_and_numbers_are_not(reading, bound_run):
+    def encoding(address: str, **headers: str) -> str | None:
+        return reading.get(address, headers=headers).headers.get("content-encoding")
+
+    assert encoding("/runs") == encoding("/presets") == encoding(f"/runs/{bound_run}/frames") == "gzip"
+    assert encoding("/runs", **{"Accept-Encoding": "identity"}) is None
+    assert encoding("/healthz") is None
+    assert encoding(f"/runs/{bound_run}/frames", **BINARY) is None
+    assert "accept-encoding" in reading.get("/runs").headers["vary"].lower()
 
 
 @pytest.mark.parametrize("part", ["", "/series", "/frames", "/flow"])

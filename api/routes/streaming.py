@@ -1,0 +1,43 @@
+"""Long answers, which are sent piece by piece as long as the token of the request is valid."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator, Iterator
+from itertools import chain
+
+from fastapi import Request
+from fastapi.responses import StreamingResponse
+from starlette.concurrency import iterate_in_threadpool
+
+from api.routes.service import Caller
+
+
+def stream(caller: Caller, request: Request, pieces: Iterator[bytes], media_type: str) -> StreamingResponse:
+    """Return an answer that is made while it is sent.
+
+    The first piece is made at once: an error in it is answered as such. If the token of the request is
+    revoked or expires, the connection is closed: the client sees that the answer is incomplete.
+
+    Parameters
+    ----------
+    caller : Caller
+        Who makes the request.
+    request : Request
+    pieces : iterator of bytes
+        At least one; made in another thread.
+    media_type : str
+
+    Returns
+    -------
+    StreamingResponse
+    """
+    all_pieces = chain([next(pieces, b"")], pieces)
+
+    async def while_valid() -> AsyncIterator[bytes]:
+        async for piece in iterate_in_threadpool(all_pieces):
+            if not await caller.is_valid():
+                request.state.abort()
+                return
+            yield piece
+
+    return StreamingResponse(while_valid(), media_type=media_type)
