@@ -55,10 +55,16 @@ class BoundedProtocol(HttpToolsProtocol):
     """Close a connection if a phase of it takes too long or is too large.
 
     Uvicorn itself limits only the time between requests, and forgets that when a byte arrives. Use
-    `bounded_protocol`, which makes a subclass with limits.
+    `bounded_protocol`, which makes a subclass with limits. Routes find it as `request.state.connection`.
+
+    Attributes
+    ----------
+    is_stopping : bool
+        Whether the server stops, so that long answers should end.
     """
 
     limits: ConnectionLimits
+    is_stopping = False
     _phase = _Phase.HEAD
     _received = 0  # bytes in this phase
     _received_after_answer = 0
@@ -78,8 +84,7 @@ class BoundedProtocol(HttpToolsProtocol):
     def on_message_begin(self) -> None:
         """Expect the head of a further request on the same connection."""
         super().on_message_begin()
-        # By this a route may end an answer at once: so the client sees that it is incomplete.
-        self.scope["state"]["abort"] = self.transport.abort
+        self.scope["state"]["connection"] = self
         if self._phase is not _Phase.HEAD:
             self._expect(_Phase.HEAD, self.limits.head_seconds, self._refuse)
 
@@ -132,6 +137,15 @@ class BoundedProtocol(HttpToolsProtocol):
             self._received > _WIRE * self.limits.body_bytes + self.limits.head_bytes
             or self._received_after_answer > self.limits.body_bytes
         )
+
+    def abort(self) -> None:
+        """End an answer at once, so that the client sees that it is incomplete."""
+        self.transport.abort()
+
+    def shutdown(self) -> None:
+        """Note that the server stops."""
+        self.is_stopping = True
+        super().shutdown()
 
     def pause_writing(self) -> None:
         """Expect that the client reads; see `asyncio.Protocol`."""

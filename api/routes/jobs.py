@@ -6,11 +6,11 @@ import asyncio
 from collections.abc import AsyncIterator
 from http import HTTPStatus
 from pathlib import Path as FilePath
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter, Depends, Header, Path, Query, Request, Response
 from fastapi.responses import PlainTextResponse
-from sse_starlette import EventSourceResponse, ServerSentEvent
+from fastapi.sse import EventSourceResponse, ServerSentEvent
 
 from api.auth import TokenScope
 from api.http.caching import json_response
@@ -19,7 +19,7 @@ from api.http.paging import CollectionPage, Limit, page_response
 from api.http.problems import Problem, documented
 from api.jobs.job import Job, JobStatus, NoSuchJob, TooManyJobs
 from api.jobs.submissions import CheckedSubmission, Estimate, Submission
-from api.routes.service import Caller, Reader, Service, Submitter
+from api.routes.service import Reader, Service, Submitter
 from api.settings import Settings
 from ensemble.errors import BadInput
 from ensemble.store import Record
@@ -33,9 +33,6 @@ SUBMISSION_BODY = {
 }
 UNSUPPORTED_MEDIA_TYPE = documented(HTTPStatus.UNSUPPORTED_MEDIA_TYPE)
 NO_SUCH_JOB = documented(HTTPStatus.NOT_FOUND)
-EVENT_STREAM: dict[int | str, dict[str, Any]] = {
-    HTTPStatus.OK.value: {"description": "Server-sent events.", "content": {"text/event-stream": {}}}
-}
 
 
 async def read_json_body(request: Request) -> bytes:
@@ -266,15 +263,8 @@ def dismiss_job(submitter: Submitter, identifier: JobKey) -> Job:
     return submitter.service.jobs.dismiss(identifier)
 
 
-@router.get(
-    "/jobs/{identifier}/events",
-    response_class=EventSourceResponse,
-    responses=NO_SUCH_JOB | EVENT_STREAM,
-)
-async def watch_job(reader: Reader, identifier: JobKey) -> EventSourceResponse:
-    """Send the present state of the job, and the new one after each change, until the job has finished.
-
-    The stream ends, too, when the token is revoked or expires.
+async def read_watched_job(reader: Reader, identifier: JobKey) -> Record:
+    """Return the job that a client wants to watch, before the stream of its events begins.
 
     Parameters
     ----------
@@ -283,29 +273,46 @@ async def watch_job(reader: Reader, identifier: JobKey) -> EventSourceResponse:
 
     Returns
     -------
-    EventSourceResponse
+    Record
 
     Raises
     ------
     NoSuchJob
         If there is no such job.
     """
-    record = await reader.service.look_up(reader.service.jobs.records.one, identifier)
-    return EventSourceResponse(_events(reader, record))
+    return await reader.service.look_up(reader.service.jobs.records.one, identifier)
 
 
-async def _events(reader: Caller, record: Record) -> AsyncIterator[ServerSentEvent]:
+@router.get("/jobs/{identifier}/events", response_class=EventSourceResponse, responses=NO_SUCH_JOB)
+async def watch_job(
+    request: Request, reader: Reader, record: Annotated[Record, Depends(read_watched_job)]
+) -> AsyncIterator[ServerSentEvent]:
+    """Send the present state of the job, and the new one after each change, until the job has finished.
+
+    The stream ends, too, when the token is revoked or expires, and when the server stops.
+
+    Parameters
+    ----------
+    request : Request
+    reader : Caller
+    record : Record
+        The job.
+
+    Yields
+    ------
+    ServerSentEvent
+    """
     service = reader.service
-    yield ServerSentEvent(event="job", data=record.json)
+    yield ServerSentEvent(event="job", raw_data=record.json)
     while not Job.model_validate_json(record.json).status.finished:
         latest = record
         while latest == record:
             await asyncio.sleep(service.settings.event_seconds)
-            if not await reader.is_valid():
+            if request.state.connection.is_stopping or not await reader.is_valid():
                 return
             latest = await _watched_job(service, record.key)
         record = latest
-        yield ServerSentEvent(event="job", data=record.json)
+        yield ServerSentEvent(event="job", raw_data=record.json)
 
 
 async def _watched_job(service: Service, identifier: str) -> Record:

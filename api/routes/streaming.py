@@ -36,7 +36,7 @@ def stream(caller: Caller, request: Request, pieces: Iterator[bytes], media_type
     async def while_valid() -> AsyncIterator[bytes]:
         async for piece in iterate_in_threadpool(all_pieces):
             if not await caller.is_valid():
-                request.state.abort()
+                request.state.connection.abort()
                 return
             yield piece
 
