@@ -11,12 +11,15 @@ from starlette.concurrency import iterate_in_threadpool
 
 from api.routes.service import Caller
 
+BEGINNING_BYTES = 1 << 16
+
 
 def stream(caller: Caller, request: Request, pieces: Iterator[bytes], media_type: str) -> StreamingResponse:
     """Return an answer that is made while it is sent.
 
-    The first piece is made at once: an error in it is answered as such. If the token of the request is
-    revoked or expires, the connection is closed: the client sees that the answer is incomplete.
+    Its beginning, and so all of a short answer, is made at once: an error in it is answered as such. If the
+    token of the request is revoked or expires, the connection is closed: the client sees that the answer is
+    incomplete.
 
     Parameters
     ----------
@@ -24,14 +27,17 @@ def stream(caller: Caller, request: Request, pieces: Iterator[bytes], media_type
         Who makes the request.
     request : Request
     pieces : iterator of bytes
-        At least one; made in another thread.
+        Made in another thread.
     media_type : str
 
     Returns
     -------
     StreamingResponse
     """
-    all_pieces = chain([next(pieces, b"")], pieces)
+    beginning = bytearray()
+    while len(beginning) < BEGINNING_BYTES and (piece := next(pieces, None)) is not None:
+        beginning += piece
+    all_pieces = chain([bytes(beginning)], pieces)
 
     async def while_valid() -> AsyncIterator[bytes]:
         async for piece in iterate_in_threadpool(all_pieces):

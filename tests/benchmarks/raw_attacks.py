@@ -1,9 +1,9 @@
 """Sends made-up bytes to the service: ``python -m tests.benchmarks.raw_attacks``.
 
 Requests are put together from valid and invalid parts, and clients behave badly after them: they are silent,
-drip, never read, close a half.  Prints how many answers of each status there were, how many connections stayed
-open, and the memory of the server before, at its largest and after.  The exit status is 0 only if there was no
-server error, no connection stayed open and the server still answers.
+drip, never read, close a half.  Prints how many answers of each status there were, how many connections
+stayed open, and the memory of the server before, at its largest and after.  The exit status is 0 only if
+there was no server error, no connection stayed open and the server still answers.
 """
 
 from __future__ import annotations
