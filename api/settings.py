@@ -114,7 +114,7 @@ class Settings(BaseSettings):
 
     @property
     def proxies(self) -> tuple[str, ...]:
-        """Addresses and networks of the trusted proxies."""
+        """The trusted proxies by their addresses and networks."""
         return _addresses(self.trusted_proxies)
 
     @property

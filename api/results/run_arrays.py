@@ -114,7 +114,13 @@ class SeriesSelection:
         return cls(arrays, selected, numbers, total)
 
     def json(self) -> Iterator[bytes]:
-        """Yield a `SeriesDocument` in pieces."""
+        """Write the diagnostics as JSON.
+
+        Yields
+        ------
+        bytes
+            Pieces of a `SeriesDocument`.
+        """
         yield b'{"series":{'
         for place, name in enumerate(self.names):
             yield b"," * (place > 0) + to_json(name) + b":"
@@ -169,7 +175,13 @@ class FrameSelection:
         return cls(arrays, _existing(numbers, total, values, maximum_values, "frames"), total, values)
 
     def json(self) -> Iterator[bytes]:
-        """Yield a `FramesDocument` in pieces."""
+        """Write the frames as JSON.
+
+        Yields
+        ------
+        bytes
+            Pieces of a `FramesDocument`.
+        """
         yield b'{"index":' + to_json(list(self.numbers)) + b',"time":'
         yield from _json_array(self._read(self._time))
         yield b',"position":'
@@ -184,7 +196,7 @@ class FrameSelection:
         return 4 * self.values * len(self.numbers)
 
     def binary(self) -> Iterator[bytes]:
-        """Yield the frames as little-endian float32, one after the other.
+        """Write the frames as little-endian float32, one after the other.
 
         Yields
         ------

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gzip
 import hashlib
-from functools import lru_cache
+from functools import cache
 from http import HTTPStatus
 from importlib.metadata import version
 from importlib.resources import files
@@ -51,25 +51,32 @@ def add_web_page(app: FastAPI) -> None:
     ----------
     app : FastAPI
     """
-    digest = assets_digest()
-    page = PAGE.read_text(encoding="utf-8").replace('"assets/', f'"assets/{digest}/')
-
-    @app.get("/", include_in_schema=False)
-    async def get_web_page() -> Response:
-        return Response(page, media_type="text/html", headers=WEB_PAGE_HEADERS)
-
-    @app.get("/assets/{of_version}/{name:path}", include_in_schema=False)
-    def get_asset(request: Request, of_version: str, name: str) -> Response:
-        path = ASSETS.get(name)
-        if path is None or of_version != digest:
-            raise HTTPException(HTTPStatus.NOT_FOUND, "there is no such asset")
-        media_type = guess_type(path)[0]
-        if "gzip" not in request.headers.get("accept-encoding", ""):
-            return FileResponse(path, headers=ASSET_HEADERS, media_type=media_type)
-        headers = ASSET_HEADERS | {"Content-Encoding": "gzip"}
-        return Response(_compressed(path), headers=headers, media_type=media_type)
+    app.add_api_route("/", _get_web_page, include_in_schema=False)
+    app.add_api_route("/assets/{name:path}", _get_asset, include_in_schema=False)
 
 
+async def _get_web_page() -> Response:
+    return Response(_web_page(), media_type="text/html", headers=WEB_PAGE_HEADERS)
+
+
+@cache
+def _web_page() -> str:
+    return PAGE.read_text(encoding="utf-8").replace('"assets/', f'"assets/{assets_digest()}/')
+
+
+def _get_asset(request: Request, name: str) -> Response:
+    path = ASSETS.get(name.removeprefix(f"{assets_digest()}/"))
+    if path is None or not name.startswith(assets_digest()):
+        raise HTTPException(HTTPStatus.NOT_FOUND, "there is no such asset")
+    media_type = guess_type(path)[0]
+    if "gzip" not in request.headers.get("accept-encoding", ""):
+        return FileResponse(path, headers=ASSET_HEADERS, media_type=media_type)
+    return Response(
+        _compressed(path), media_type=media_type, headers=ASSET_HEADERS | {"Content-Encoding": "gzip"}
+    )
+
+
+@cache
 def assets_digest() -> str:
     """Return a digest of the assets, which are Plotly of the installed version and files of this package.
 
@@ -83,7 +90,7 @@ def assets_digest() -> str:
     return digest.hexdigest()[:16]
 
 
-@lru_cache(None)
+@cache
 def _compressed(path: Path) -> bytes:
     """Return an asset compressed; each is compressed once, whoever asks for it how often."""
     return gzip.compress(path.read_bytes(), mtime=0)

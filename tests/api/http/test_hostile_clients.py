@@ -272,10 +272,10 @@ def _send_injections(submitting: httpx.Client) -> None:
         "a=b" + " " * 900 + "\n",
         "a=b" + " " * 31_000 + "\n",
         " " * 31_000 + "=",
-        "a." * 15_000 + "=1",
-        "=" * 31_000,
+        "a." * 10_000 + "=1",
+        "=" * 10_000,
         "flow.rate=" + "9" * 30_000,
-        "flow.rate" + "\t" * 30_000 + "x",
+        "flow.rate" + "\t" * 10_000 + "x",
     ],
 )
 @pytest.mark.parametrize("kind", ["runs", "boundaries"])
