@@ -73,6 +73,9 @@ class Energy:
 
 LARGEST_SPATIAL = 1e-3
 
+# As large as forces and angles themselves: beyond, a run is not begun.
+HOPELESS_SPATIAL = 1.0
+
 
 @dataclass(frozen=True)
 class Errors:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.analysis import averages
-from solver.analysis.run import LARGEST_SPATIAL, Energy, Outcome, Run, Work
+from solver.analysis.run import HOPELESS_SPATIAL, LARGEST_SPATIAL, Energy, Outcome, Run, Work
 from solver.forces.tension import TensionNotFoundError
 from solver.integrators import StepFailedError
 from solver.membrane.geometry import Membranes
@@ -88,26 +88,20 @@ def simulate(
         resolution = resolution_of(within)
         start = _start(within, resolution.points, parallel, should_stop)
         should_stop = first_rank_asks(parallel, should_stop)
-        limit = scene.numerics.wall_limit
-        out_of_time = limit and first_rank_asks(parallel, lambda: clock.perf_counter() - began > limit)
+        require_time = _wall_limit(scene, parallel, began)
         equation_of = partial(equation_of_motion, parallel=parallel)
         examine = None if scene.many else partial(_examined, within)
-        loop = TimeLoop(
-            within, start.points, start.state, resolution, equation_of, parallel, frame, examine=examine
-        )
+        placed = with_points(within, start.points)
+        loop = TimeLoop(placed, start.state, resolution, equation_of, parallel, frame, examine)
         failure = None
         try:
-            loop.recorder.record(loop.time, loop.state)
-            if start.failure:
-                raise StepFailedError(start.failure)
-            loop.begin()
+            _begin(loop, start)
             while not loop.done:
                 if not loop.advance():
                     continue
                 if should_stop and should_stop():
                     raise Cancelled
-                if out_of_time and out_of_time():
-                    raise StepFailedError(f"the wall limit of {limit:g} s is reached at time {loop.time:g}")
+                require_time(loop.time)
                 if on_progress:
                     on_progress(loop.time, scene.latest_time)
             loop.recorder.finish(loop.time, loop.state)
@@ -124,6 +118,30 @@ class _Start:
     state: Array
     evaluations: int = 0
     failure: str | None = None
+
+
+def _begin(loop: TimeLoop, start: _Start) -> None:
+    """Record the start, and prepare the first step unless there is none."""
+    loop.recorder.record(loop.time, loop.state)
+    if start.failure:
+        raise StepFailedError(start.failure)
+    if loop.recorder.spatial_error > HOPELESS_SPATIAL:
+        raise UnresolvedError("the run was not begun")
+    loop.begin()
+
+
+def _wall_limit(scene: Scene, parallel: Parallel, began: float) -> Callable[[float], None]:
+    """Return what fails once the scene's wall limit is reached; it is given the time in the run."""
+    limit = scene.numerics.wall_limit
+    if limit is None:
+        return lambda time: None
+    reached = first_rank_asks(parallel, lambda: clock.perf_counter() - began > limit)
+
+    def require_time(time: float) -> None:
+        if reached and reached():
+            raise StepFailedError(f"the wall limit of {limit:g} s is reached at time {time:g}")
+
+    return require_time
 
 
 def _start(scene: Scene, points: int, parallel: Parallel, should_stop: Callable[[], bool] | None) -> _Start:

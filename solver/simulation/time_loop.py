@@ -37,8 +37,7 @@ class TimeLoop:
     Parameters
     ----------
     scene : Scene
-    points : int
-        On each vesicle at the start.
+        With the number of points at the start.
     state : (state_size,)
         At time 0, with these points.
     resolution : Resolution
@@ -80,7 +79,6 @@ class TimeLoop:
     def __init__(
         self,
         scene: Scene,
-        points: int,
         state: Array,
         resolution: Resolution,
         equation_of: Callable[[Scene], EquationOfMotion],
@@ -98,7 +96,7 @@ class TimeLoop:
         self.time = 0.0
         self.state = state
         self.outcome = Outcome.UNDECIDED
-        self.segment = Segment(equation_of(with_points(scene, points)), scene, SegmentWork())
+        self.segment = Segment(equation_of(scene), scene, SegmentWork())
         membranes = self.segment.membranes
         self._line_of_centers = (
             LineOfCenters(membranes, state, scene.criteria.separated_distance)
