@@ -12,7 +12,14 @@ from typing import Annotated
 
 import typer
 
-from ensemble.cli import preset_command, question_commands, report_commands, schema_command, store_commands
+from ensemble.cli import (
+    preset_command,
+    question_commands,
+    report_commands,
+    schema_command,
+    steady_commands,
+    store_commands,
+)
 from ensemble.errors import BadInput, EnsembleError
 from ensemble.mpi.world import only_first_rank_speaks, pin_threads
 
@@ -25,12 +32,14 @@ app = typer.Typer(
 )
 for _command in (
     *question_commands.COMMANDS,
+    steady_commands.steady,
     *store_commands.COMMANDS,
     report_commands.report,
     preset_command.presets,
     schema_command.schema,
 ):
     app.command()(_command)
+app.command("continue")(steady_commands.follow)  # the name is a word of Python
 
 
 def _print_version(requested: bool) -> None:

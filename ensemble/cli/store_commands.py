@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -13,28 +13,38 @@ from ensemble.config.defaults import DEFAULT_STORE
 from ensemble.errors import refusing
 
 if TYPE_CHECKING:
-    from ensemble.questions import StoredAnswer, StoredAnswers
+    from ensemble.questions import Question, StoredAnswer, StoredAnswers
+    from ensemble.questions.branches import StoredBranches
     from ensemble.store import Store
 
 
 def _collections() -> list[str]:
-    from ensemble.questions import kinds
+    return [shelf.collection for shelf in _shelves() if shelf.collection is not None]
 
-    return [kind.collection for kind in kinds() if kind.collection is not None]
+
+def _shelves() -> list[type[Question[Any]] | type[StoredBranches]]:
+    """Return what knows the answers of a store: the kinds of question, and the branches."""
+    from ensemble.questions import kinds
+    from ensemble.questions.branches import StoredBranches
+
+    return [*kinds(), StoredBranches]
 
 
 def query(  # numpydoc ignore=PR01
     collection: Annotated[
         str,
         typer.Argument(
-            metavar="runs|boundaries|…", help="What to list.", autocompletion=_collections, show_default=False
+            metavar="runs|boundaries|branches|…",
+            help="What to list.",
+            autocompletion=_collections,
+            show_default=False,
         ),
     ],
     where: Filters = [],  # noqa: B006  typer copies it
     store: StorePath = DEFAULT_STORE,
     as_json: AsJson = False,
 ) -> None:
-    """List the runs or the boundaries of a store."""
+    """List the runs, the boundaries or the branches of steady states of a store."""
     with refusing(), _existing(store) as opened:
         answers = _all_stored(opened, collection, where)
     if as_json:
@@ -44,11 +54,9 @@ def query(  # numpydoc ignore=PR01
 
 
 def _all_stored(store: Store, collection: str, where: list[str]) -> StoredAnswers:
-    from ensemble.questions import kinds
-
-    for kind in kinds():
-        if kind.collection == collection:
-            return kind.all_stored(store, where)
+    for shelf in _shelves():
+        if shelf.collection == collection:
+            return shelf.all_stored(store, where)
     raise ValueError(f"{collection!r} — must be one of {', '.join(_collections())}")
 
 
@@ -56,8 +64,8 @@ def show(  # numpydoc ignore=PR01
     name: Annotated[
         str,
         typer.Argument(
-            metavar="RUN|BOUNDARY",
-            help="Key of either or the beginning of one, or a boundary's name.",
+            metavar="RUN|BOUNDARY|BRANCH",
+            help="Key of one of these or its beginning, or a boundary's name.",
         ),
     ],
     output: Annotated[
@@ -69,7 +77,7 @@ def show(  # numpydoc ignore=PR01
     store: StorePath = DEFAULT_STORE,
     as_json: AsJson = False,
 ) -> None:
-    """Print a run or a boundary, or draw it to a file."""
+    """Print a run, a boundary or a branch of steady states, or draw it to a file."""
     with refusing(), _existing(store) as opened:
         answer = _stored(opened, name)
         if output is not None:
@@ -81,10 +89,8 @@ def show(  # numpydoc ignore=PR01
 
 
 def _stored(store: Store, name: str) -> StoredAnswer:
-    from ensemble.questions import kinds
-
-    for kind in kinds():
-        answer = kind.stored(store, name)
+    for shelf in _shelves():
+        answer = shelf.stored(store, name)
         if answer is not None:
             return answer
     raise ValueError(f"{name!r} — names none of the {' and '.join(_collections())} in {store.path}")
@@ -101,7 +107,7 @@ def check(  # numpydoc ignore=PR01
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Verify every run and boundary of a store; the exit status is 1 if anything is wrong."""
+    """Verify every run, boundary and branch of a store; the exit status is 1 if anything is wrong."""
     from ensemble.store import Store
 
     with refusing():

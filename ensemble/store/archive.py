@@ -28,7 +28,16 @@ def _chunks(values: Array) -> tuple[int, ...]:
     return tuple(max(length, 1) for length in (rows, *values.shape[1:]))
 
 
-def _write_array(group: zarr.Group, name: str, array: NamedArray) -> None:
+def write_array(group: zarr.Group, name: str, array: NamedArray) -> None:
+    """Write an array to a group.
+
+    Parameters
+    ----------
+    group : Group
+        Of zarr.
+    name : str
+    array : NamedArray
+    """
     group.create_array(
         name,
         data=np.ascontiguousarray(array.values),
@@ -54,7 +63,7 @@ def write_run(directory: Path, summary: RunSummary, run: Run) -> None:
     """
     group = zarr.create_group(LocalStore(directory), zarr_format=3, attributes=summary.document())
     for name, array in arrays(run).items():
-        _write_array(group, name, array)
+        write_array(group, name, array)
 
 
 def _open(directory: Path) -> zarr.Group:

@@ -85,16 +85,25 @@ class RunStaging(AbstractContextManager["RunStaging"]):
         from ensemble.store.archive import write_run
 
         summary = RunSummary.of(run) if summary is None else summary
-        with self._guard:
-            if self._descriptor is None:
-                self._descriptor = self._register()
-        whole = self._directory / uuid4().hex
+        whole = self.directory() / uuid4().hex
         partial = whole.with_suffix(PARTIAL)
         write_run(partial, summary, run)
         flush_tree(partial)
         partial.rename(whole)
         flush(self._directory)
         return Staged(whole, summary)
+
+    def directory(self) -> Path:
+        """Return this process's directory; it is made if there is none.
+
+        Returns
+        -------
+        Path
+        """
+        with self._guard:
+            if self._descriptor is None:
+                self._descriptor = self._register()
+        return self._directory
 
     def close(self) -> None:
         """Remove this process's directory, unless a whole run in it waits to be committed."""

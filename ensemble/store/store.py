@@ -13,6 +13,7 @@ import os
 import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, closing, contextmanager
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Self, TypeVar
 
@@ -31,7 +32,10 @@ from ensemble.store.staging import STAGING, STORE_LOCK, RunStaging, Staged
 from solver.analysis.run import Outcome, Run
 
 if TYPE_CHECKING:
+    from ensemble.search.branch import BranchSummary
     from ensemble.store.archive import StoredArrays
+    from ensemble.store.branch_shelf import BranchShelf
+    from solver.simulation.steady_scenes import SteadyBranch
 
 COMMIT_SECONDS = 60  # for which a commit is tried again while the database or the disk does not answer
 
@@ -602,8 +606,25 @@ class Store(AbstractContextManager["Store"]):
         """
         return self._catalog.boundaries_page(where, after, limit)
 
+    def save_branch(self, summary: BranchSummary, branch: SteadyBranch) -> None:
+        """Keep a branch of steady states, unless the store has it.
+
+        Parameters
+        ----------
+        summary : BranchSummary
+        branch : SteadyBranch
+        """
+        self.branches.save(summary, branch, self._staging.directory())
+
+    @cached_property
+    def branches(self) -> BranchShelf:
+        """The branches of steady states."""
+        from ensemble.store.branch_shelf import BranchShelf
+
+        return BranchShelf(self.path)
+
     def check(self) -> list[str]:
-        """Verify every run and boundary, and that directory and catalog name the same runs.
+        """Verify every run, boundary and branch, and that directory and catalog name the same runs.
 
         Returns
         -------
@@ -626,7 +647,7 @@ class Store(AbstractContextManager["Store"]):
             problems += unreadable
             if directory.is_dir() and not unreadable:
                 problems += check_run(directory, _validated(RunSummary, "run", record))
-        return [*different, *problems]
+        return [*different, *problems, *self.branches.problems()]
 
 
 def _exists(path: Path) -> bool:

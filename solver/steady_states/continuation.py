@@ -35,7 +35,7 @@ _RANK = 1e-10
 _ROUND_OFF = 1e-4
 _FIRST_STEP, _SMALLEST_STEP, _LARGEST_STEP = 0.02, 1e-5, 0.1
 _SMALL_CHANGE = 1e-4  # of a parameter, over its scale, in differences
-_STRAIGHT, _LEAST_STRAIGHT = 0.99, 0.9  # cosines of the angle between neighboring tangents
+_STRAIGHT, _LEAST_STRAIGHT = 0.99, 0.95  # cosines of the angle between neighboring tangents
 _ROOT = 1e-9  # accuracy of folds and crossings, as a distance along the branch
 _SAME = 1e-4  # distance along the branch below which a crossing is the fold's own
 

@@ -1,0 +1,79 @@
+"""Commands that compute steady states and branches of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from ensemble.cli.options import AsJson, Changes, Document, StorePath
+from ensemble.cli.printing import print_json, print_table
+from ensemble.config.defaults import DEFAULT_STORE
+from ensemble.errors import refusing
+from ensemble.mpi.world import launched_rank
+
+if TYPE_CHECKING:
+    from ensemble.questions import Answer
+
+NoStore = Annotated[bool, typer.Option("--no-store", help="Keep nothing.")]
+
+
+def steady(  # numpydoc ignore=PR01
+    scene: Document,
+    changes: Changes = [],  # noqa: B006  typer copies it
+    store: StorePath = DEFAULT_STORE,
+    no_store: NoStore = False,
+    as_json: AsJson = False,
+) -> None:
+    """Compute the steady state to which a scene comes, and whether it is stable.
+
+    It starts from the end of the scene's run.  The exit status is 1 if there is no steady state.
+    """
+    from ensemble.config.documents import load_scene
+    from ensemble.questions.branches import require_steady_states, steady_answer
+
+    with refusing():
+        loaded = load_scene(scene, changes)
+        require_steady_states(loaded)
+    _print(lambda: steady_answer(loaded, None if no_store else store), as_json)
+
+
+def follow(  # numpydoc ignore=PR01
+    scene: Document,
+    parameter: Annotated[
+        str, typer.Option(metavar="PATH", help="The number of the scene that changes: a dotted path.")
+    ],
+    to: Annotated[
+        float | None, typer.Option(help="Value at which it ends; left out, it rises as far as it goes.")
+    ] = None,
+    changes: Changes = [],  # noqa: B006
+    store: StorePath = DEFAULT_STORE,
+    no_store: NoStore = False,
+    as_json: AsJson = False,
+) -> None:
+    """Follow a steady state as a parameter changes, through folds, and find where it becomes unstable.
+
+    It starts from the end of the scene's run.  The branch ends at the given value, where it comes back to its
+    first one, or where the scene allows no more.  The exit status is 1 if there is no steady state.
+    """
+    from ensemble.config.documents import load_scene
+    from ensemble.questions.branches import BranchQuestion
+
+    with refusing():
+        question = BranchQuestion(load_scene(scene, changes), parameter, to)
+    _print(lambda: question.answer(None if no_store else store), as_json)
+
+
+def _print(answer_of: Callable[[], Answer], as_json: bool) -> None:
+    """Print an answer that the first rank computes alone, and exit."""
+    if launched_rank() != 0:
+        raise typer.Exit
+    answer = answer_of()
+    if as_json:
+        print_json(answer.json_document())
+    else:
+        print_table(answer.table())
+        if answer.footer is not None:
+            print(answer.footer)
+    raise typer.Exit(0 if answer.complete else 1)

@@ -1,0 +1,78 @@
+"""Tables of branches of steady states, for people."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from rich.markup import escape
+from rich.table import Column, Table
+
+if TYPE_CHECKING:
+    from ensemble.search.branch import BranchPointRecord, BranchSummary
+
+_ABSENT = "–"
+
+
+def branch_table(summary: BranchSummary) -> Table:
+    """Return a table of a branch: a row for each point, and for each fold and crossing in its place.
+
+    Parameters
+    ----------
+    summary : BranchSummary
+
+    Returns
+    -------
+    Table
+    """
+    headings = [summary.parameter, "", "outcome", "stable", "growth", "inclination", "gap"]
+    table = Table(*(Column(heading, overflow="fold") for heading in headings), title=escape(summary.key))
+    for point in summary.branch:
+        table.add_row(*_cells(point, ""))
+    for name, points in (("fold", summary.folds), ("crossing", summary.crossings)):
+        for point in points:
+            table.add_row(*_cells(point, name))
+    return table
+
+
+def branches_table(summaries: Sequence[BranchSummary]) -> Table:
+    """Return a table of branches, with a row for each.
+
+    Parameters
+    ----------
+    summaries : sequence of BranchSummary
+
+    Returns
+    -------
+    Table
+    """
+    headings = ["parameter", "from", "points", "folds", "crossings"]
+    table = Table(
+        Column("branch", no_wrap=True, overflow="ignore"),
+        *(Column(heading, overflow="fold") for heading in headings),
+    )
+    for summary in summaries:
+        folds, crossings = (
+            ", ".join(f"{point.value:.10g}" for point in points) or _ABSENT
+            for points in (summary.folds, summary.crossings)
+        )
+        first = summary.branch[0].value
+        table.add_row(
+            summary.key, summary.parameter, f"{first:.6g}", str(len(summary.branch)), folds, crossings
+        )
+    return table
+
+
+def _cells(point: BranchPointRecord, name: str) -> list[str]:
+    state = point.state
+    real, imaginary = state.eigenvalues[0]
+    growth = f"{real:.3g}" + (f" ± {abs(imaginary):.3g}i" if imaginary else "")
+    return [
+        f"{point.value:.10g}",
+        name,
+        state.outcome,
+        _ABSENT if name else ("yes" if state.stable else "no"),
+        growth,
+        _ABSENT if state.inclination_angle is None else f"{state.inclination_angle:.4f}°",
+        _ABSENT if state.gap is None else f"{state.gap:.5g}",
+    ]

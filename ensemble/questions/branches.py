@@ -1,0 +1,333 @@
+"""The questions which steady state a scene has, and how it changes with a parameter.
+
+They start from the end of the scene's run, which a store may have already.
+"""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from ensemble.config.dotted_paths import parameter_value
+from ensemble.config.overrides import override
+from ensemble.config.run_key import run_key
+from ensemble.config.validation import validated
+from ensemble.questions.question import Answer, StoredAnswer, StoredAnswers
+from solver.scene import LARGEST_DENSE, Scene
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from ensemble.search.branch import BranchSummary
+    from ensemble.store import Store
+    from solver.analysis.run import Run
+    from solver.simulation.steady_scenes import Shapes
+
+
+@dataclass(frozen=True)
+class BranchQuestion:
+    """How the steady states of a scene change with a parameter.
+
+    Attributes
+    ----------
+    scene : Scene
+        At the start of the branch.
+    parameter : str
+        Dotted path of a number in the scene.
+    to : float or None
+        Value at which the branch ends; None to follow it upward as far as it goes.
+    """
+
+    scene: Scene
+    parameter: str
+    to: float | None
+
+    def __post_init__(self) -> None:
+        require_steady_states(self.scene)
+        if self.to == self.start:
+            raise ValueError(f"to: {self.to:g} is the value that the scene has; give another one")
+        if self.to is not None:
+            self.scene_at(self.to)
+
+    @property
+    def start(self) -> float:
+        """Value of the parameter in the scene."""
+        return float(parameter_value(self.scene, self.parameter))
+
+    def scene_at(self, value: float) -> Scene:
+        """Return the scene at a value of the parameter.
+
+        Parameters
+        ----------
+        value : float
+
+        Returns
+        -------
+        Scene
+
+        Raises
+        ------
+        OutsideParameterError
+            If the scene does not allow it.
+        """
+        from solver.steady_states.continuation import OutsideParameterError
+
+        try:
+            return validated(Scene, override(self.scene.model_dump(), {self.parameter: value}))
+        except ValueError as error:
+            raise OutsideParameterError(str(error)) from error
+
+    def answer(self, path: Path | None) -> Answer:
+        """Follow the branch, unless a store has it.
+
+        Parameters
+        ----------
+        path : Path or None
+            Directory of the store that keeps the branch and the run from which it starts.
+
+        Returns
+        -------
+        Answer
+        """
+        from ensemble.search.branch import branch_key
+        from ensemble.store.branch_record import summary_of
+        from solver.simulation.resolution import with_points
+        from solver.simulation.steady_scenes import follow_steady_states
+        from solver.steady_states.continuation import Limits
+        from solver.steady_states.newton import NoSteadyStateError
+
+        began = clock.perf_counter()
+        with _opened(path) as store:
+            key = branch_key(self.scene, self.parameter, self.to)
+            if store is not None and store.branches.contains(key):
+                return _FollowedBranch(store.branches.summary(key), clock.perf_counter() - began)
+            near = _end_of_run(self.scene, store)
+            if isinstance(near, str):
+                return _NoAnswer(near)
+            points = near.tangent_angle.shape[1]
+            limits = Limits(float("inf") if self.to is None else self.to)
+            upward = limits.to > self.start
+            try:
+                branch = follow_steady_states(
+                    lambda value: with_points(self.scene_at(value), points), self.start, near, limits, upward
+                )
+            except NoSteadyStateError as error:
+                return _NoAnswer(str(error))
+            summary = summary_of(self.scene, self.parameter, self.to, branch)
+            if store is not None:
+                store.save_branch(summary, branch)
+            return _FollowedBranch(summary, clock.perf_counter() - began)
+
+
+def steady_answer(scene: Scene, path: Path | None) -> Answer:
+    """Find the steady state to which the run of a scene comes.
+
+    Parameters
+    ----------
+    scene : Scene
+    path : Path or None
+        Directory of the store that keeps the run.
+
+    Returns
+    -------
+    Answer
+
+    Raises
+    ------
+    ValueError
+        If steady states of such a scene are not computed.
+    """
+    from ensemble.search.branch import SteadyRecord
+    from solver.simulation.resolution import with_points
+    from solver.simulation.steady_scenes import find_steady_state
+    from solver.steady_states.newton import NoSteadyStateError
+
+    require_steady_states(scene)
+    with _opened(path) as store:
+        near = _end_of_run(scene, store)
+    if isinstance(near, str):
+        return _NoAnswer(near)
+    try:
+        state = find_steady_state(with_points(scene, near.tangent_angle.shape[1]), near)
+    except NoSteadyStateError as error:
+        return _NoAnswer(str(error))
+    return _SteadyAnswer(SteadyRecord.of(state).model_dump(mode="json"), run_key(scene))
+
+
+def require_steady_states(scene: Scene) -> None:
+    """Refuse a scene whose steady states are not computed.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Raises
+    ------
+    ValueError
+        If it has too many vesicles, or a pair that revolves.
+    """
+    count = len(scene.vesicles)
+    if count > LARGEST_DENSE:
+        raise ValueError(f"vesicles: steady states are computed of at most {LARGEST_DENSE}, got {count}")
+    if count > 1 and scene.flow is not None and scene.flow.rotates:
+        raise ValueError(
+            f"flow.kind: {scene.flow.kind!r} turns several vesicles round; they have no steady state"
+        )
+
+
+def _opened(path: Path | None) -> Any:
+    from ensemble.store import Store
+
+    return nullcontext() if path is None else Store.open(path)
+
+
+def _end_of_run(scene: Scene, store: Store | None) -> Shapes | str:
+    """Return the shapes at the end of the scene's run, from a store if it has it; or why there are none."""
+    from solver.analysis.run import Outcome
+    from solver.simulation.simulate import simulate
+    from solver.simulation.steady_scenes import Shapes
+
+    key = run_key(scene)
+    run: Run
+    if store is not None and store.contains(key):
+        run = store.load(key)
+    else:
+        run = simulate(scene)
+        if store is not None:
+            store.save(run)
+    if run.outcome in (Outcome.FAILED, Outcome.SEPARATED, Outcome.TUMBLING):
+        return f"the run of the scene comes to no rest: {run.failure or run.outcome}"
+    center = run.frames.center[-1]
+    if scene.flow is not None and scene.flow.comoving is not None:
+        center = center - center.mean(axis=0)  # the flow has carried them away, and far off digits are lost
+    return Shapes(run.frames.tangent_angle[-1], center)
+
+
+@dataclass(frozen=True)
+class _NoAnswer(Answer):
+    """There is no steady state, for a reason."""
+
+    failure: str
+    complete: ClassVar[bool] = False
+
+    def json_document(self) -> dict[str, Any]:
+        return {"failure": self.failure}
+
+    def table(self) -> Table:
+        from ensemble.display.result_tables import fields_table
+
+        return fields_table(self.json_document())
+
+
+@dataclass(frozen=True)
+class _SteadyAnswer(Answer):
+    """A steady state."""
+
+    record: dict[str, Any]
+    key: str
+    complete: ClassVar[bool] = True
+
+    def json_document(self) -> dict[str, Any]:
+        return {"failure": None} | self.record | {"run_key": self.key}
+
+    def table(self) -> Table:
+        from ensemble.display.result_tables import fields_table
+
+        return fields_table(self.json_document())
+
+
+@dataclass(frozen=True)
+class _FollowedBranch(Answer):
+    """A branch that has just been followed, or that the store had already."""
+
+    summary: BranchSummary
+    seconds: float
+    complete: ClassVar[bool] = True
+
+    def json_document(self) -> dict[str, Any]:
+        return {"failure": None} | self.summary.document() | {"wall_seconds": self.seconds}
+
+    def table(self) -> Table:
+        from ensemble.display.branch_tables import branch_table
+
+        return branch_table(self.summary)
+
+    @property
+    def footer(self) -> str:
+        return f"it was followed no farther: {self.summary.ended}"
+
+
+@dataclass(frozen=True)
+class _StoredBranch(StoredAnswer):
+    """A branch of a store."""
+
+    summary: BranchSummary
+
+    def json_document(self) -> dict[str, Any]:
+        return self.summary.document()
+
+    def table(self) -> Table:
+        from ensemble.display.branch_tables import branch_table
+
+        return branch_table(self.summary)
+
+    def draw(self, output: Path) -> None:
+        """Draw the bifurcation diagram."""
+        from ensemble.figures import save
+        from ensemble.figures.bifurcation import bifurcation_diagram
+
+        save(bifurcation_diagram([self.summary]), output)
+
+
+class StoredBranches:
+    """The branches of stores, as `ensemble query` and `ensemble show` ask for them."""
+
+    collection: ClassVar[str] = "branches"
+
+    @classmethod
+    def stored(cls, store: Store, name: str) -> StoredAnswer | None:
+        """Return a branch.
+
+        Parameters
+        ----------
+        store : Store
+        name : str
+            Its key, or as much of it as no other key begins with.
+
+        Returns
+        -------
+        StoredAnswer or None
+            None if there is no such branch.
+        """
+        keys = [key for key in store.branches.keys() if name and key.startswith(name)]  # noqa: SIM118
+        return _StoredBranch(store.branches.summary(keys[0])) if len(keys) == 1 else None
+
+    @classmethod
+    def all_stored(cls, store: Store, where: Sequence[str]) -> StoredAnswers:
+        """Return all branches.
+
+        Parameters
+        ----------
+        store : Store
+        where : sequence of str
+            Must be empty.
+
+        Returns
+        -------
+        StoredAnswers
+
+        Raises
+        ------
+        ValueError
+            If there is a condition.
+        """
+        from ensemble.display.branch_tables import branches_table
+
+        if where:
+            raise ValueError(f"where: {where[0]!r} — branches are listed without conditions")
+        summaries = store.branches.summaries()
+        return StoredAnswers([summary.document() for summary in summaries], branches_table(summaries))

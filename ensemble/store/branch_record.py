@@ -1,0 +1,80 @@
+"""A branch of steady states as files hold it: a summary and arrays with named dimensions."""
+
+from __future__ import annotations
+
+import platform
+from importlib.metadata import version
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ensemble.search.branch import BranchPointRecord, BranchSummary, branch_key
+from ensemble.store.run_record import RESULT_PACKAGES, NamedArray
+from ensemble.timestamp import now
+from solver.revision import RESULTS_REVISION
+
+if TYPE_CHECKING:
+    from solver.scene import Scene
+    from solver.simulation.steady_scenes import SteadyBranch
+
+
+def summary_of(scene: Scene, parameter: str, to: float | None, branch: SteadyBranch) -> BranchSummary:
+    """Summarize a branch that this process has just followed.
+
+    Parameters
+    ----------
+    scene : Scene
+    parameter : str
+    to : float or None
+    branch : SteadyBranch
+
+    Returns
+    -------
+    BranchSummary
+    """
+    versions = {package: version(package) for package in RESULT_PACKAGES}
+    points, folds, crossings = (
+        tuple(map(BranchPointRecord.of, part)) for part in (branch.points, branch.folds, branch.crossings)
+    )
+    return BranchSummary(
+        key=branch_key(scene, parameter, to),
+        created=now(),
+        versions=versions | {"python": platform.python_version()},
+        results_revision=RESULTS_REVISION,
+        scene=scene,
+        parameter=parameter,
+        to=to,
+        ended=branch.ended,
+        branch=points,
+        folds=folds,
+        crossings=crossings,
+    )
+
+
+def branch_arrays(branch: SteadyBranch) -> dict[str, NamedArray]:
+    """Return the arrays of a branch by name.
+
+    Parameters
+    ----------
+    branch : SteadyBranch
+
+    Returns
+    -------
+    dict of str to NamedArray
+        ``parameter`` over the points, and the shapes; the same of folds and crossings with a prefix.
+    """
+    arrays = dict[str, NamedArray]()
+    parts = {"": branch.points, "fold_": branch.folds, "crossing_": branch.crossings}
+    for prefix, points in parts.items():
+        if not points:
+            continue
+        over = f"{prefix}parameter"
+        shapes = [point.state.shapes for point in points]
+        arrays[over] = NamedArray((over,), np.array([point.parameter for point in points]))
+        arrays[f"{prefix}tangent_angle"] = NamedArray(
+            (over, "vesicle", "point"), np.array([shape.tangent_angle for shape in shapes])
+        )
+        arrays[f"{prefix}center"] = NamedArray(
+            (over, "vesicle", "axis"), np.array([shape.center for shape in shapes])
+        )
+    return arrays

@@ -1,0 +1,142 @@
+"""`ensemble steady` and `ensemble continue`: their documents, what is refused, and the store of branches."""
+
+from __future__ import annotations
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+import xarray
+
+from ensemble.figures.bifurcation import bifurcation_diagram
+from ensemble.store import Store, StoreError
+
+TREADING = (
+    "vesicle-shear",
+    "--set=vesicles.reduced_area=0.8",
+    "--set=flow.rate=1.0",
+    "--set=vesicles.viscosity_contrast=4.2",
+    "--set=numerics.points=32",
+)
+FOLLOWED = ("continue", *TREADING, "--parameter=vesicles.viscosity_contrast")
+
+
+@pytest.fixture(scope="module")
+def followed(ensemble, tmp_path_factory):
+    """A store with a branch, and the document that was printed."""
+    store = tmp_path_factory.mktemp("branches") / "store"
+    result = ensemble(*FOLLOWED, f"--store={store}", "--json")
+    assert result.returncode == 0, result.stderr
+    return store, json.loads(result.stdout)
+
+
+def test_a_branch_is_followed_through_its_fold_and_back(followed):
+    _, document = followed
+    (fold,) = document["folds"]
+    assert document["crossings"] == []
+    values = [point["parameter"] for point in document["branch"]]
+    assert values[0] == values[-1] == 4.2
+    assert max(values) <= fold["value"] == pytest.approx(4.2345, abs=5e-3)
+    stable = [point["stable"] for point in document["branch"]]
+    assert stable[0]
+    assert not stable[-1]
+    assert abs(fold["eigenvalues"][0][0]) < 1e-4
+    first = document["branch"][0]
+    assert first["outcome"] == "steady"
+    assert (
+        first["inclination_angle"] > fold["inclination_angle"] > document["branch"][-1]["inclination_angle"]
+    )
+    assert first["viscosity"]["total"] > 0
+
+
+def test_a_steady_state_is_the_first_point_of_its_branch(ensemble, followed):
+    store, document = followed
+    result = ensemble("steady", *TREADING, f"--store={store}", "--json")
+    assert result.returncode == 0
+    answer = json.loads(result.stdout)
+    first = document["branch"][0]
+    assert answer["stable"] is first["stable"] is True
+    assert answer["inclination_angle"] == pytest.approx(first["inclination_angle"], abs=1e-8)
+    np.testing.assert_allclose(answer["eigenvalues"], first["eigenvalues"], atol=1e-6)
+    with Store.existing(store) as opened:
+        assert [summary.key for summary in opened.summaries()] == [answer["run_key"]]
+
+
+def test_a_stored_branch_is_not_followed_again(ensemble, followed):
+    store, document = followed
+    result = ensemble(*FOLLOWED, f"--store={store}", "--json")
+    again = json.loads(result.stdout)
+    assert again["created"] == document["created"]
+
+
+def test_a_stored_branch_is_shown_listed_checked_and_drawn(ensemble, followed, tmp_path):
+    store, document = followed
+    key, place = document["key"], f"--store={store}"
+    assert json.loads(ensemble("query", "branches", place, "--json").stdout)[0]["folds"] == document["folds"]
+    assert "fold" in ensemble("show", key, place).stdout
+    file = tmp_path / "diagram.svg"
+    assert ensemble("show", key[:8], place, f"--output={file}").returncode == 0
+    assert file.stat().st_size > 1000
+    with Store.existing(store) as opened:
+        assert opened.check() == []
+    arrays = xarray.open_zarr(store / "branches" / key, consolidated=False).load()
+    assert arrays["tangent_angle"].dims == ("parameter", "vesicle", "point")
+    np.testing.assert_array_equal(
+        arrays["parameter"].values, [point["parameter"] for point in document["branch"]]
+    )
+
+
+def test_a_damaged_branch_is_noticed(followed, tmp_path):
+    store, document = followed
+    copy = tmp_path / "copy"
+    shutil.copytree(store, copy)
+    chunks = (copy / "branches" / document["key"] / "tangent_angle" / "c").rglob("*")
+    chunk = next(path for path in chunks if path.is_file())
+    chunk.write_bytes(chunk.read_bytes()[:-1] + b"?")
+    with Store.existing(copy) as opened:
+        assert any(document["key"] in problem for problem in opened.check())
+        opened.branches.summary(document["key"])
+        with pytest.raises(StoreError):
+            opened.branches.summary("0" * 32)
+
+
+def test_the_diagram_shows_stable_and_unstable_parts_up_to_the_fold(followed):
+    store, document = followed
+    with Store.existing(store) as opened:
+        figure = bifurcation_diagram(opened.branches.summaries())
+    upper, lower = figure.axes
+    (fold,) = [line for line in upper.lines if line.get_gid() == "fold"]
+    (stable,) = [line for line in upper.lines if line.get_gid() == "stable"]
+    (unstable,) = [line for line in upper.lines if line.get_gid() == "unstable"]
+    place = fold.get_xydata()[0]
+    assert place[0] == document["folds"][0]["value"]
+    np.testing.assert_array_equal(stable.get_xydata()[-1], place)
+    np.testing.assert_array_equal(unstable.get_xydata()[0], place)
+    growth = {line.get_gid(): line.get_ydata() for line in lower.lines}
+    assert max(growth["stable"][:-1]) < 0 < min(growth["unstable"][1:])
+
+
+REFUSED = {
+    "a pair that revolves": (["steady", "doublet-shear"], "flow.kind"),
+    "many vesicles": (["steady", "suspension-shear"], "vesicles"),
+    "no number": (["continue", *TREADING, "--parameter=flow.kind"], "flow.kind"),
+    "the same value": ([*FOLLOWED, "--to=4.2"], "to"),
+    "a value that is not allowed": ([*FOLLOWED, "--to=-1"], "viscosity_contrast"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_bad_input_is_refused_before_any_work(ensemble, tmp_path, case):
+    arguments, field = REFUSED[case]
+    result = ensemble(*arguments, "--store=store", cwd=tmp_path)
+    assert result.returncode == 2
+    assert field in result.stderr
+    assert len(result.stderr.strip().splitlines()) == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_run_that_does_not_rest_has_no_steady_state(ensemble):
+    result = ensemble("steady", *TREADING, "--set=vesicles.viscosity_contrast=6", "--no-store", "--json")
+    assert result.returncode == 1
+    assert "tumbling" in json.loads(result.stdout)["failure"]
