@@ -22,6 +22,7 @@ Quantity = Callable[[Array], float]  # of a state
 _SAFETY = 3.0  # factor within which an estimated error is trusted
 _SAMPLES = 16  # of a turn; what is averaged over it is smooth
 _FEWEST_SAMPLES = 4
+_REST = 0.1  # share of the errors at single instants that an average keeps
 _LARGEST = 1e-2  # root mean square of the error of a state with which quantities change linearly
 _LARGEST_TRANSVERSE = 0.1  # root mean square; the pair may be on the way to another state
 _PART = 1e-3  # of a step, over which a quantity is taken to change linearly
@@ -68,8 +69,8 @@ class AnswerErrors:
             return
         for time in tracker.half_turns[len(self._at_half_turns) :]:
             self._at_half_turns.append(_time_error(step, time, tracker.angle_of) if time > 0 else np.zeros(2))
-        begin = tracker.half_turns[-3] if len(tracker.half_turns) > 2 else 0.0
-        self._samples = [sample for sample in self._samples if sample.time >= begin]
+            begin = tracker.half_turns[-3] if len(tracker.half_turns) > 2 else 0.0
+            self._samples = [sample for sample in self._samples if sample.time >= begin]
         self._samples.append(_Sample(step.end, step.state, step.error(step.end)))
         if isinstance(tracker, LineOfCenters):
             self._follow_distance(step, tracker)
@@ -118,7 +119,9 @@ class AnswerErrors:
         mean, *change = np.trapezoid(columns, times, axis=0) / duration
         # The turn of the trajectory y − e begins and ends at other times.
         shifts = (values[-1] - mean) * self._at_half_turns[-1] - (values[0] - mean) * self._at_half_turns[-3]
-        return magnitude(change + shifts / duration)
+        # What only delays the motion cancels in an average, but not to the last digit.
+        rest = _REST * float(np.abs(changes[:, 0]).mean())
+        return float(np.hypot(magnitude(change + shifts / duration), rest))
 
     def _follow_distance(self, step: Step, line: LineOfCenters) -> None:
         assert step.error is not None
