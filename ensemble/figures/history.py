@@ -91,7 +91,7 @@ def _heading(run: Run) -> list[str]:
     """Return the scene in one line, then the outcome and the reason of a failure in lines that fit."""
     outcome = f"{run.outcome} at $t$ = {run.time:.4g}"
     if run.period is not None:
-        outcome += f", period {run.period:.4g}"
-    if run.failure is not None:
-        outcome += ": " + run.failure.replace("$", r"\$")
+        outcome += f", period {run.period:.4g}" + (" (not settled)" if run.settled is False else "")
+    if reason := run.failure or run.undecided:
+        outcome += ": " + reason.replace("$", r"\$")
     return [describe(run.scene), *textwrap.wrap(outcome, _CHARACTERS)]

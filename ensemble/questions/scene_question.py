@@ -27,10 +27,12 @@ _WORK = ("points", "steps", "rejected_steps", "rhs_evaluations", "wall_seconds")
 _RESULTS = (
     "outcome",
     "failure",
+    "undecided",
     "time",
     "perturbations",
     "sensitive",
     "period",
+    "settled",
     "effective_aspect_ratio",
     "inclination_angle",
     "gap",

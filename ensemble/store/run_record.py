@@ -49,8 +49,10 @@ class RunSummary(BaseModel):
     scene: Scene
     outcome: Outcome
     failure: str | None
+    undecided: str | None = None
     time: float
     period: float | None
+    settled: bool | None = None
     effective_aspect_ratio: float | None
     inclination_angle: float | None
     gap: float | None

@@ -51,7 +51,7 @@ class AnswerErrors:
 
     def __init__(self, tracker: RevolutionTracker | None) -> None:
         self._tracker = tracker
-        self._at_half_turns: list[Array] = []
+        self._at_passages: list[Array] = []
         self._samples: list[_Sample] = []
         self._separation: Array | None = None
         self.sensitive = False
@@ -67,9 +67,9 @@ class AnswerErrors:
         tracker = self._tracker
         if tracker is None or step.error is None:
             return
-        for time in tracker.half_turns[len(self._at_half_turns) :]:
-            self._at_half_turns.append(_time_error(step, time, tracker.angle_of) if time > 0 else np.zeros(2))
-            begin = tracker.half_turns[-3] if len(tracker.half_turns) > 2 else 0.0
+        for time in tracker.passages[len(self._at_passages) :]:
+            self._at_passages.append(_time_error(step, time, tracker.angle_of) if time > 0 else np.zeros(2))
+            begin = tracker.passages[-3] if len(tracker.passages) > 2 else 0.0
             self._samples = [sample for sample in self._samples if sample.time >= begin]
         self._samples.append(_Sample(step.end, step.state, step.error(step.end)))
         if isinstance(tracker, LineOfCenters):
@@ -79,9 +79,9 @@ class AnswerErrors:
     @property
     def period(self) -> float | None:
         """That of the duration of the last full turn; None before there is one."""
-        if len(self._at_half_turns) < 3:
+        if len(self._at_passages) < 3:
             return None
-        return magnitude(self._at_half_turns[-1] - self._at_half_turns[-3])
+        return magnitude(self._at_passages[-1] - self._at_passages[-3])
 
     @property
     def separation(self) -> float | None:
@@ -103,7 +103,7 @@ class AnswerErrors:
         """
         if self.period is None or self._tracker is None:
             return None
-        first, last = self._tracker.half_turns[-3], self._tracker.half_turns[-1]
+        first, last = self._tracker.passages[-3], self._tracker.passages[-1]
         size = self._samples[-1].state.size
         inside = [s for s in self._samples if first <= s.time <= last and s.state.size == size]
         if len(inside) < _FEWEST_SAMPLES:
@@ -118,7 +118,7 @@ class AnswerErrors:
         columns = np.vstack([columns[:1], columns, columns[-1:]])
         mean, *change = np.trapezoid(columns, times, axis=0) / duration
         # The turn of the trajectory y − e begins and ends at other times.
-        shifts = (values[-1] - mean) * self._at_half_turns[-1] - (values[0] - mean) * self._at_half_turns[-3]
+        shifts = (values[-1] - mean) * self._at_passages[-1] - (values[0] - mean) * self._at_passages[-3]
         # What only delays the motion cancels in an average, but not to the last digit.
         rest = _REST * float(np.abs(changes[:, 0]).mean())
         return float(np.hypot(magnitude(change + shifts / duration), rest))

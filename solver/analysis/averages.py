@@ -1,4 +1,4 @@
-"""Summary values of a finished run, from recorded series and from the revolutions that were followed."""
+"""Summary values of a finished run, from what was followed from step to step and from its last state."""
 
 from __future__ import annotations
 
@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from solver.analysis.run import Outcome, Series, Viscosity
+from solver.analysis.viscosity_history import viscosity_of
 
 if TYPE_CHECKING:
     from solver.analysis.revolutions import RevolutionTracker
+    from solver.analysis.viscosity_history import ViscosityHistory
     from solver.scene import Scene
 
 Array = NDArray[np.float64]
@@ -53,8 +54,28 @@ def inclination(scene: Scene, series: Series) -> float | None:
     return None
 
 
+def steady_viscosity(series: Series) -> Viscosity | None:
+    """Return the intrinsic viscosity of a steady state, that of the last sample.
+
+    Parameters
+    ----------
+    series : Series
+
+    Returns
+    -------
+    Viscosity or None
+        None without shear.
+    """
+    parts = {name: float(series[name][-1]) for name in series if name.startswith("viscosity_")}
+    return viscosity_of(parts) if parts else None
+
+
 def viscosity(
-    scene: Scene, series: Series, outcome: Outcome, tracker: RevolutionTracker | None
+    scene: Scene,
+    series: Series,
+    outcome: Outcome,
+    tracker: RevolutionTracker | None,
+    history: ViscosityHistory | None,
 ) -> Viscosity | None:
     """Return the average of the intrinsic viscosity that `solver.analysis.run.Viscosity` describes.
 
@@ -62,45 +83,22 @@ def viscosity(
     ----------
     scene : Scene
     series : Series
+        Whose last sample is that at the end of the run.
     outcome : Outcome
     tracker : RevolutionTracker or None
         Of the pair's line of centers or the single vesicle's long axis, where one was followed.
+    history : ViscosityHistory or None
+        Where the scene has a viscosity.
 
     Returns
     -------
     Viscosity or None
         None without a viscosity, and while there is no full turn to average over.
     """
-    if "viscosity_bending_tension" not in series:
+    if history is None:
         return None
     if outcome is Outcome.STEADY:
-
-        def average(name: str) -> float:
-            return float(series[name][-1])
-
-    else:
-        interval = _averaged_over(scene, series, tracker)
-        if interval is None:
-            return None
-        first, last = interval
-
-        def average(name: str) -> float:
-            return float(CubicSpline(series["time"], series[name]).integrate(first, last)) / (last - first)
-
-    membrane = average("viscosity_bending_tension")
-    adhesion, contrast = (
-        average(name) if name in series else None for name in ("viscosity_adhesion", "viscosity_contrast")
-    )
-    total = membrane + (adhesion or 0.0) + (contrast or 0.0)
-    return Viscosity(total=total, bending_tension=membrane, adhesion=adhesion, contrast=contrast)
-
-
-def _averaged_over(
-    scene: Scene, series: Series, tracker: RevolutionTracker | None
-) -> tuple[float, float] | None:
-    """Return the interval over which the viscosity of an unsteady run is averaged, if there is one."""
+        return steady_viscosity(series)
     if tracker:
-        return (tracker.half_turns[-3], tracker.half_turns[-1]) if tracker.period else None
-    if len(scene.vesicles) == 1 or len(series["time"]) < 2:
-        return None
-    return float(series["time"][-1]) / 2, float(series["time"][-1])
+        return history.average(*tracker.last_turn) if tracker.last_turn else None
+    return history.average(scene.horizon / 2, float(series["time"][-1]))

@@ -15,7 +15,6 @@ from solver.motion.equation import EquationOfMotion, Motion
 from solver.potentials.neighbors import gap
 
 if TYPE_CHECKING:
-    from solver.membrane.geometry import Membranes
     from solver.scene import Scene, Vesicle
 
 Array = NDArray[np.float64]
@@ -23,30 +22,6 @@ Measure = Callable[[Motion], float]
 VesicleMeasure = Callable[[Motion], Array]
 
 _LEAST_VESICLES = 3  # of which each is measured on its own
-
-
-def state_rate(membranes: Membranes, change: Array, duration: float) -> float:
-    """Return the largest rate at which a tangent angle, or a center relative to their mean, changed.
-
-    It is zero when shapes and arrangement stay.  Treading does not count, since the points move along the
-    membranes such that tangent angles stay.
-
-    Parameters
-    ----------
-    membranes : Membranes
-    change : (state_size,)
-        Difference of two states.
-    duration : float
-        Time between them.
-
-    Returns
-    -------
-    float
-        Radians, or lengths, over time.
-    """
-    angles, centers = membranes.tangent_angle(change), membranes.curve_center(change)
-    relative = centers - centers.mean(axis=0)
-    return float(max(np.abs(angles).max(), np.abs(relative).max()) / duration)
 
 
 def measures(scene: Scene, equation: EquationOfMotion) -> dict[str, Measure]:
@@ -79,15 +54,28 @@ def measures(scene: Scene, equation: EquationOfMotion) -> dict[str, Measure]:
         measured["gap"] = lambda motion: gap(motion.geometry)
     else:
         measured["inclination_angle"] = lambda motion: float(curve.inclination(motion.geometry.points[:, 0]))
+    return measured | viscosity_measures(scene, equation)
+
+
+def viscosity_measures(scene: Scene, equation: EquationOfMotion) -> dict[str, Measure]:
+    """Return the parts of the intrinsic viscosity that a scene has: stresses over shear rate and area.
+
+    Parameters
+    ----------
+    scene : Scene
+    equation : EquationOfMotion
+        Of this scene.
+
+    Returns
+    -------
+    dict
+        As of `measures`; empty without shear.
+    """
     shear_rate = scene.flow.shear_rate if scene.flow else None
-    if shear_rate:
-        area = equation.membranes.multiplicity * target_area.sum()
-        measured |= _viscosities(equation, 1 / (shear_rate * area))
-    return measured
-
-
-def _viscosities(equation: EquationOfMotion, scale: float) -> dict[str, Measure]:
-    """Return the parts of the intrinsic viscosity, which are stresses times ``scale``."""
+    if not shear_rate:
+        return {}
+    area = equation.membranes.multiplicity * _areas(scene.vesicles[: equation.membranes.count]).sum()
+    scale = 1 / (shear_rate * area)
     parts: dict[str, Measure] = {"viscosity_bending_tension": lambda motion: scale * membrane_stress(motion)}
     if equation.adhesion:
         parts["viscosity_adhesion"] = lambda motion: scale * adhesion_stress(motion)

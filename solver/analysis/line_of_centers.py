@@ -1,13 +1,14 @@
-"""The line of centers of two vesicles: its length, its angle, and the times of its half turns."""
+"""The line of centers of two vesicles: its length, its half turns, and how far it opens in each."""
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.analysis.revolutions import RevolutionTracker, crossing
+from solver.analysis.revolutions import CountedDirection, RevolutionTracker, crossing, greatest
 
 if TYPE_CHECKING:
     from solver.integrators import Step
@@ -27,6 +28,7 @@ class LineOfCenters(RevolutionTracker):
     membranes : Membranes
     state : (state_size,)
         At the start.
+    counted : CountedDirection
     separated_distance : float
         Distance beyond which a pair that moves apart counts as separated.
 
@@ -34,6 +36,8 @@ class LineOfCenters(RevolutionTracker):
     ----------
     distance : float
         At the end of the last step.
+    openings : list of float
+        The largest distance in each half turn from one passage to the next, continuous in time.
     separated : bool
         Whether the distance has passed the separated distance, or 1.5 times that at the start if that is
         more.
@@ -43,11 +47,15 @@ class LineOfCenters(RevolutionTracker):
 
     direction_period = 2 * np.pi
 
-    def __init__(self, membranes: Membranes, state: Array, separated_distance: float) -> None:
-        super().__init__(membranes, state)
+    def __init__(
+        self, membranes: Membranes, state: Array, counted: CountedDirection, separated_distance: float
+    ) -> None:
+        super().__init__(membranes, state, counted)
         self.distance = self.distance_of(state)
         self.separated_distance = max(separated_distance, _FARTHER * self.distance)
         self.separated = False
+        self.openings: list[float] = []
+        self._opening = 0.0  # in the half turn that has not ended
 
     def advance(self, step: Step) -> Step:
         """Follow one step, but no farther than to separation.
@@ -64,9 +72,29 @@ class LineOfCenters(RevolutionTracker):
         if self.distance_of(step.state) >= self.separated_distance:
             self.separated = True
             step = step.until(crossing(step, lambda state: self.distance_of(state) - self.separated_distance))
+        known = len(self.passages)
         step = super().advance(step)
         self.distance = self.distance_of(step.state)
+        self._follow_opening(step, known)
         return step
+
+    @property
+    def cycle(self) -> Array:
+        """What characterizes each half turn, (half turns, 2): logarithms of its duration and opening."""
+        return np.column_stack([super().cycle, np.log(self.openings)])
+
+    def _follow_opening(self, step: Step, known: int) -> None:
+        """Take in the distances of a step; the passages from the index ``known`` on are in it."""
+        times = [step.start, *self.passages[known:], step.end]
+        for index, (first, last) in enumerate(pairwise(times)):
+            if index > 0:
+                self._end_half_turn(known + index - 1)
+            self._opening = max(self._opening, greatest(step, self.distance_of, first, last))
+
+    def _end_half_turn(self, passage: int) -> None:
+        if passage > 0:  # before the first passage there is no half turn
+            self.openings.append(self._opening)
+        self._opening = 0.0
 
     def distance_of(self, state: Array) -> float:
         """Return the center distance in a state.

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.analysis.contacts import cluster_sizes
-from solver.analysis.diagnostics import measures, state_rate, vesicle_measures
+from solver.analysis.diagnostics import measures, vesicle_measures
 from solver.analysis.run import Frames, Series, VesicleSeries
+from solver.analysis.settling import state_rate
 from solver.analysis.spatial_error import shape_tails, spatial_error
 from solver.membrane.geometry import Geometry
 from solver.membrane.resampling import resampled_angle, resampled_state

@@ -1,23 +1,68 @@
-"""The times at which a line in the plane has made its half turns."""
+"""The times at which a line in the plane completes its half turns, and how long they take."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from solver.analysis.settling import has_settled
 from solver.membrane import curve
 
 if TYPE_CHECKING:
+    from solver.flows import ImposedFlow
     from solver.integrators import Step
     from solver.membrane.geometry import Membranes
     from solver.scene import Scene
 
 Array = NDArray[np.float64]
+
+_NODES = np.cos(np.pi * np.arange(5) / 4)  # Chebyshev's, on [-1, 1]
+_COEFFICIENTS = np.linalg.inv(np.vander(_NODES, increasing=True))  # of the polynomial through values at them
+_ROUND_OFF = 1e-6  # half turns
+# A line may be counted in this many directions, from that of the y axis on.
+_DIRECTIONS = np.pi / 2 + np.linspace(0.0, np.pi, 180, endpoint=False)
+
+
+class CountedDirection(NamedTuple):
+    """The direction in which the half turns of a line are counted.
+
+    Attributes
+    ----------
+    angle : float
+        Of the direction and its opposite, radians.
+    sense : int
+        In which a line turns there: 1 for counterclockwise, -1 for clockwise.
+    """
+
+    angle: float
+    sense: int
+
+
+def counted_direction(flow: ImposedFlow | None) -> CountedDirection:
+    """Return the direction in which a flow turns a line fastest, in shear that across the flow.
+
+    A pair slides open and closes again while its line of centers passes the slow direction.  So between two
+    passages of the fast one it does so once, and their times are well defined.
+
+    Parameters
+    ----------
+    flow : ImposedFlow or None
+
+    Returns
+    -------
+    CountedDirection
+    """
+    gradient = flow.velocity_gradient(np.zeros(2)) if flow else np.zeros((2, 2))
+    along = np.stack([np.cos(_DIRECTIONS), np.sin(_DIRECTIONS)])
+    rate = along[0] * (gradient[1] @ along) - along[1] * (gradient[0] @ along)
+    fastest = int(np.argmax(np.abs(rate)))
+    return CountedDirection(float(_DIRECTIONS[fastest]), 1 if rate[fastest] > 0 else -1)
 
 
 class RevolutionTracker(ABC):
@@ -28,6 +73,7 @@ class RevolutionTracker(ABC):
     membranes : Membranes
     state : (state_size,)
         At the start.
+    counted : CountedDirection
 
     Attributes
     ----------
@@ -35,18 +81,22 @@ class RevolutionTracker(ABC):
         Rotation after which the line is the same: 2π, or π for a line without a head.
     angle : float
         At the end of the last step; radians, unwrapped.
-    half_turns : list of float
-        ``half_turns[k]`` is the time at which the line had first turned by kπ from its start, either way.
+    passages : list of float
+        Times at which the line first came to stand in the counted direction, or opposite to it, and then
+        after each further half turn.
     membranes : Membranes
         Those of the steps.  Set it when the number of points changes.
     """
 
     direction_period: float
 
-    def __init__(self, membranes: Membranes, state: Array) -> None:
+    def __init__(self, membranes: Membranes, state: Array, counted: CountedDirection) -> None:
         self.membranes = membranes
-        self.angle = self._start = self._direction(state)
-        self.half_turns = [0.0]
+        self._counted = counted
+        self.angle = self._direction(state)
+        # A start in the counted direction is no passage, whatever its round-off.
+        self._first = np.floor(self._half_turns(self.angle) + _ROUND_OFF) + 1
+        self.passages: list[float] = []
 
     @abstractmethod
     def _direction(self, state: Array) -> float:
@@ -65,8 +115,8 @@ class RevolutionTracker(ABC):
             The part that was followed.
         """
         angle = self.angle_of(step.state)
-        while abs(angle - self._start) >= len(self.half_turns) * np.pi:
-            self.half_turns.append(crossing(step, self._excess_turn))
+        while self._half_turns(angle) >= self._first + len(self.passages):
+            self.passages.append(crossing(step, self._beyond_next_passage))
         self.angle = angle
         return step
 
@@ -87,13 +137,45 @@ class RevolutionTracker(ABC):
         return angle + self.direction_period * round((self.angle - angle) / self.direction_period)
 
     @property
+    def half_turns(self) -> int:
+        """Number of half turns from one passage to the next."""
+        return max(len(self.passages) - 1, 0)
+
+    @property
+    def last_turn(self) -> tuple[float, float] | None:
+        """When the last full turn began and ended; None before the first one."""
+        return (self.passages[-3], self.passages[-1]) if self.half_turns > 1 else None
+
+    @property
     def period(self) -> float | None:
         """Duration of the last full turn; None before the first one."""
-        return self.half_turns[-1] - self.half_turns[-3] if len(self.half_turns) > 2 else None
+        return self.last_turn[1] - self.last_turn[0] if self.last_turn else None
 
-    def _excess_turn(self, state: Array) -> float:
-        """Return how far the line has turned beyond the next half turn, radians."""
-        return abs(self.angle_of(state) - self._start) - len(self.half_turns) * np.pi
+    @property
+    def cycle(self) -> Array:
+        """What characterizes each half turn, (half turns, quantities): the logarithm of its duration."""
+        return np.log(np.diff(self.passages))[:, None]
+
+    def has_settled(self, change: float) -> bool:
+        """Return whether the half turns repeat themselves, and will.
+
+        Parameters
+        ----------
+        change : float
+            Largest relative change of what characterizes them.
+
+        Returns
+        -------
+        bool
+        """
+        return has_settled(self.cycle, change)
+
+    def _half_turns(self, angle: float) -> float:
+        """Return how many half turns a line at an angle is beyond the counted direction."""
+        return self._counted.sense * (angle - self._counted.angle) / np.pi
+
+    def _beyond_next_passage(self, state: Array) -> float:
+        return self._half_turns(self.angle_of(state)) - (self._first + len(self.passages))
 
 
 class LongAxisTracker(RevolutionTracker):
@@ -121,6 +203,33 @@ def may_tumble(scene: Scene) -> bool:
     flow = scene.imposed_flow
     rotates = flow is not None and flow.rotates
     return len(scene.vesicles) == 1 and rotates and scene.vesicles[0].reduced_area < 1
+
+
+def greatest(step: Step, quantity: Callable[[Array], float], first: float, last: float) -> float:
+    """Return the maximum of a smooth quantity over a part of a step.
+
+    It is that of the polynomial of degree 4 through five values: no less accurate than the step.
+
+    Parameters
+    ----------
+    step : Step
+    quantity : callable
+        From a state to a number.
+    first, last : float
+        Where the part begins and ends.
+
+    Returns
+    -------
+    float
+    """
+    times = 0.5 * (first + last) + 0.5 * (last - first) * _NODES
+    values = np.array([quantity(step.interpolate(time)) for time in times])
+    if np.argmax(values) in (0, _NODES.size - 1):
+        return float(values.max())
+    polynomial = Polynomial(_COEFFICIENTS @ values)
+    extremes = polynomial.deriv().roots()
+    inside = extremes[np.isreal(extremes) & (np.abs(extremes) < 1)].real
+    return float(max(values.max(), *polynomial(inside)))
 
 
 def crossing(step: Step, excess: Callable[[Array], float]) -> float:

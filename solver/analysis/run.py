@@ -191,10 +191,15 @@ class Run:
     outcome : Outcome
     failure : str or None
         Why a run failed.
+    undecided : str or None
+        Why a run is undecided, where its criteria say so.
     time : float
         At the end.
     period : float or None
         Duration of the last full turn.
+    settled : bool or None
+        Whether the motion repeats itself, so that the period and averages over the last turn are those of
+        every later one (`Criteria.settled_change`).  None without a period, and in old records.
     effective_aspect_ratio : float or None
         Of the rigid ellipse with this period in the same flow.
     inclination_angle : float or None
@@ -234,3 +239,5 @@ class Run:
     vesicle_series: VesicleSeries = field(default_factory=dict)
     perturbations: tuple[float, ...] = ()
     sensitive: bool = False
+    settled: bool | None = None
+    undecided: str | None = None

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from pydantic import Field
+from typing import Any
 
-from solver.model import Model, NonNegative, Positive
+from pydantic import Field, model_validator
+
+from solver.model import Model, Positive
+
+_FORMER = ("gap_growth",)
 
 
 class Criteria(Model):
@@ -16,9 +20,12 @@ class Criteria(Model):
         Center distance beyond which a pair that moves apart is separated; 1.5 times the first distance if
         that is more.
     revolutions : int
-        Full turns that the line of centers of a bound pair has made, or the long axis of a tumbling vesicle.
-    gap_growth : float
-        Relative growth of the largest gap, from one half turn to the next, that a bound pair may have.
+        Full turns that the line of centers of a bound pair has made at least, or the long axis of a tumbling
+        vesicle.
+    settled_change : float
+        A motion that revolves has settled if durations of its half turns, and largest center distances in
+        them, change relatively by no more, from one to the next or from every other one to the next, and by
+        no more in all that follow.
     steady_rate : float
         A state is steady if no tangent angle and no center changes faster.
     steady_time : float
@@ -29,7 +36,15 @@ class Criteria(Model):
 
     separated_distance: Positive = 12.0
     revolutions: int = Field(1, ge=1)
-    gap_growth: NonNegative = 0.01
+    settled_change: Positive = 0.01
     steady_rate: Positive = 1e-5
     steady_time: Positive = 5.0
     extensions: float = Field(4.0, ge=1)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_former_fields(cls, fields: Any) -> Any:
+        """Leave out what runs stored by earlier versions have."""
+        if isinstance(fields, dict):
+            return {name: value for name, value in fields.items() if name not in _FORMER}
+        return fields

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# While a start relaxes, whatever the scene records: when the relaxation ends depends on when it is sampled.
+# While a start relaxes, whatever the scene records: only its last state is kept.
 _RELAXATION_OUTPUT = {"interval": 2.0, "frame_interval": 10.0}
 
 _NUMERICAL_FAILURES = (
@@ -201,12 +201,14 @@ def _finished(
         scene=scene,
         outcome=outcome,
         failure=failure,
+        undecided=loop.undecided if failure is None else None,
         time=loop.time,
         period=period,
+        settled=loop.settled if period else None,
         effective_aspect_ratio=flow.effective_aspect_ratio(period) if flow and period else None,
         inclination_angle=averages.inclination(scene, series),
         gap=float(series["gap"][-1]) if "gap" in series else None,
-        viscosity=averages.viscosity(scene, series, outcome, loop.tracker),
+        viscosity=averages.viscosity(scene, series, outcome, loop.tracker, loop.viscosities),
         energy=Energy(
             bending=float(series["bending_energy"][-1]),
             adhesion=float(series["adhesion_energy"][-1]) if "adhesion_energy" in series else None,

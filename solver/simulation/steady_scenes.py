@@ -212,7 +212,7 @@ def _described(scene: Scene, equations: SteadyEquations, state: Array) -> Steady
         eigenvalues=perturbations.eigenvalues[:_KEPT_EIGENVALUES],
         inclination_angle=averages.inclination(scene, series),
         gap=float(series["gap"][0]) if "gap" in series else None,
-        viscosity=averages.viscosity(scene, series, Outcome.STEADY, None),
+        viscosity=averages.steady_viscosity(series),
         energy=Energy(
             bending=float(series["bending_energy"][0]),
             adhesion=float(series["adhesion_energy"][0]) if "adhesion_energy" in series else None,

@@ -13,8 +13,14 @@ from solver.analysis.answer_errors import AnswerErrors
 from solver.analysis.criteria import History, criteria_for
 from solver.analysis.line_of_centers import LineOfCenters
 from solver.analysis.recorder import Recorder
-from solver.analysis.revolutions import LongAxisTracker, RevolutionTracker, may_tumble
+from solver.analysis.revolutions import (
+    LongAxisTracker,
+    RevolutionTracker,
+    counted_direction,
+    may_tumble,
+)
 from solver.analysis.run import Outcome
+from solver.analysis.viscosity_history import ViscosityHistory
 from solver.integrators import Step, StepFailedError
 from solver.membrane.resampling import resampled_state
 from solver.parallel import Parallel, require_agreement
@@ -63,6 +69,8 @@ class TimeLoop:
     tracker : RevolutionTracker or None
         Of the line of centers of a pair, or of the long axis of a single vesicle that may tumble.
     recorder : Recorder
+    viscosities : ViscosityHistory or None
+        In shear.
     steps, rejected_steps : int
     smallest_step : float or None
         Of the accepted steps; None before the first one.
@@ -98,16 +106,19 @@ class TimeLoop:
         self.outcome = Outcome.UNDECIDED
         self.segment = Segment(equation_of(scene), scene, SegmentWork())
         membranes = self.segment.membranes
+        counted = counted_direction(scene.flow)
         self._line_of_centers = (
-            LineOfCenters(membranes, state, scene.criteria.separated_distance)
+            LineOfCenters(membranes, state, counted, scene.criteria.separated_distance)
             if len(scene.vesicles) == 2
             else None
         )
-        self._long_axis = LongAxisTracker(membranes, state) if may_tumble(scene) else None
+        self._long_axis = LongAxisTracker(membranes, state, counted) if may_tumble(scene) else None
         self.tracker: RevolutionTracker | None = self._line_of_centers or self._long_axis
         self.recorder = Recorder(
             scene, self.segment.equation, self._line_of_centers, frame.origin if frame else None
         )
+        in_shear = scene.flow is not None and scene.flow.shear_rate
+        self.viscosities = ViscosityHistory(scene, self.segment.equation) if in_shear else None
         self.steps = self.rejected_steps = 0
         self.smallest_step: float | None = None
         self.temporal_error = 0.0
@@ -119,6 +130,11 @@ class TimeLoop:
     def done(self) -> bool:
         """Whether the run is decided or has come to its latest time."""
         return self.time >= self._scene.latest_time or self.outcome is not Outcome.UNDECIDED
+
+    @property
+    def settled(self) -> bool:
+        """Whether the motion that is tracked has settled."""
+        return self.tracker is not None and self.tracker.has_settled(self._scene.criteria.settled_change)
 
     def begin(self) -> None:
         """Prepare the first step."""
@@ -182,6 +198,8 @@ class TimeLoop:
         equation = self._equation_of(with_points(self._scene, points))
         self.segment = Segment(equation, self._scene, self.segment.work)
         self.recorder.continue_with(self.segment.equation)
+        if self.viscosities:
+            self.viscosities.continue_with(self.segment.equation)
         if self.tracker:
             self.tracker.membranes = self.segment.membranes
 
@@ -196,6 +214,8 @@ class TimeLoop:
         if self._frame:
             self._frame.follow(step, self.segment.membranes)
         self.recorder.record_up_to(step)
+        if self.viscosities and self._enters_averages(step):
+            self.viscosities.follow(step)
         self.time, self.state = step.end, step.state
         self.error = step.error(step.end) if step.error else None
         self.steps += 1
@@ -204,8 +224,25 @@ class TimeLoop:
         self.outcome = self._decide()
         self._depart()
 
+    def _enters_averages(self, step: Step) -> bool:
+        """Return whether a step may enter averages: after the first passage, or in the second half."""
+        return bool(self.tracker.passages) if self.tracker else step.end > self._scene.horizon / 2
+
     def _decide(self) -> Outcome:
-        history = History(
+        decisions = (criterion.decide(self._history) for criterion in self._criteria)
+        return next((outcome for outcome in decisions if outcome), Outcome.UNDECIDED)
+
+    @property
+    def undecided(self) -> str | None:
+        """Why the run is undecided, as far as its criteria say."""
+        if self.outcome is not Outcome.UNDECIDED:
+            return None
+        lacking = (criterion.lacking(self._history) for criterion in self._criteria)
+        return "; ".join(reason for reason in lacking if reason) or None
+
+    @property
+    def _history(self) -> History:
+        return History(
             time=self.time,
             state=self.state,
             membranes=self.segment.membranes,
@@ -214,5 +251,3 @@ class TimeLoop:
             long_axis=self._long_axis,
             examine=partial(self._examine, self.segment.membranes, self.state) if self._examine else None,
         )
-        decisions = (criterion.decide(history) for criterion in self._criteria)
-        return next((outcome for outcome in decisions if outcome), Outcome.UNDECIDED)

@@ -32,7 +32,6 @@ RETIRED = {
     "glide": "move along the membrane",
     "inquiry": "point search",
     "offer": "submit",
-    "settled": "result",
     "standing": "progress",
 }
 _FENCE = re.compile(r"^ *```(\w*)\n(.*?)^ *```$", flags=re.MULTILINE | re.DOTALL)

@@ -34,7 +34,8 @@ class History:
     membranes : Membranes
         Those of the state.
     samples : mapping from name to sequence of float
-        The recorded diagnostics, ``time`` among them; `solver.analysis.run.Series` names them.
+        The recorded diagnostics, ``time`` among them; `solver.analysis.run.Series` names them.  A criterion
+        that reads them depends on how often a scene is recorded; none of this package does.
     line_of_centers : LineOfCenters or None
         Of two vesicles.
     long_axis : LongAxisTracker or None
@@ -99,3 +100,17 @@ class Criterion(ABC):
         -------
         Outcome or None
         """
+
+    def lacking(self, history: History) -> str | None:
+        """Return what an undecided run lacks at its end for this criterion to decide it.
+
+        Parameters
+        ----------
+        history : History
+
+        Returns
+        -------
+        str or None
+            In one line; None if there is nothing to say.
+        """
+        return None

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from solver.analysis.criteria.criterion import Criterion, History
 from solver.analysis.run import Outcome
+from solver.analysis.settling import convergence
 
 if TYPE_CHECKING:
     from solver.scene import Scene
 
 
 class Revolved(Criterion):
-    """The line of centers has made ``revolutions`` full turns, and the gap no longer grows.
+    """The line of centers has made ``revolutions`` full turns, and its motion has settled.
 
-    A pair slides open once in every half turn.  The gap's maximum in the last half turn must not exceed that
-    in the one before by more than the fraction ``gap_growth``.
+    A pair slides open once in every half turn.  Durations of half turns and largest distances of the centers
+    in them must repeat themselves within ``settled_change``, and go on to do so (`has_settled`).  One turn is
+    no proof: a motion may approach an unstable one for a while before it leaves it.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ class Revolved(Criterion):
 
     def __init__(self, scene: Scene) -> None:
         super().__init__(scene)
-        self._compared = 0  # half turns after which the gap has been looked at
+        self._seen = 0  # half turns that have been looked at
 
     @classmethod
     def applies_to(cls, scene: Scene) -> bool:
@@ -44,7 +44,7 @@ class Revolved(Criterion):
         return len(scene.vesicles) == 2 and flow is not None and flow.rotates
 
     def decide(self, history: History) -> Outcome | None:
-        """Return `Outcome.BOUND` at the first half turn after which the gap has not grown.
+        """Return `Outcome.BOUND` at the first half turn after which the motion has settled.
 
         Parameters
         ----------
@@ -54,14 +54,34 @@ class Revolved(Criterion):
         -------
         Outcome or None
         """
-        assert history.line_of_centers
-        half_turns = history.line_of_centers.half_turns
-        completed = len(half_turns) - 1
-        if completed < 2 * self._scene.criteria.revolutions or completed == self._compared:
+        line, criteria = history.line_of_centers, self._scene.criteria
+        assert line
+        if line.half_turns == self._seen:
             return None
-        self._compared = completed
-        earlier, previous, last = half_turns[-3:]
-        time, gap = np.array(history.samples["time"]), np.array(history.samples["gap"])
-        before = gap[(time >= earlier) & (time <= previous)].max(initial=0.0)
-        after = gap[(time >= previous) & (time <= last)].max(initial=0.0)
-        return Outcome.BOUND if after <= (1 + self._scene.criteria.gap_growth) * before else None
+        self._seen = line.half_turns
+        bound = self._seen >= 2 * criteria.revolutions and line.has_settled(criteria.settled_change)
+        return Outcome.BOUND if bound else None
+
+    def lacking(self, history: History) -> str | None:
+        """Return how far the pair has turned, or how much its half turns still change.
+
+        Parameters
+        ----------
+        history : History
+
+        Returns
+        -------
+        str or None
+        """
+        line, criteria = history.line_of_centers, self._scene.criteria
+        assert line
+        found = convergence(line.cycle)
+        if line.half_turns < 2 * criteria.revolutions or not found:
+            return (
+                f"the pair has made {line.half_turns / 2:g} full turns since it first stood across the flow"
+            )
+        change = min(each.change for each in found)
+        return (
+            f"the motion has not settled: after {line.half_turns / 2:g} full turns it still changes by "
+            f"{100 * change:.2g} %, and criteria.settled_change is {100 * criteria.settled_change:g} %"
+        )

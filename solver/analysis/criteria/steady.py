@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from solver.analysis.criteria.criterion import Criterion, History
 from solver.analysis.criteria.revolved import Revolved
 from solver.analysis.run import Outcome
+from solver.analysis.settling import state_rate
 from solver.membrane import curve
 
 if TYPE_CHECKING:
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+_COMPARED = 0.1  # States are compared that lie this part of the steady time apart, or one step.
 _LATER = 1.2  # a slow motion is examined again when this multiple of the time has passed
 
 
@@ -40,6 +42,8 @@ class Steady(Criterion):
         super().__init__(scene)
         self._leaves = False  # an unstable state, and has not moved yet
         self._again = 0.0  # when a slow motion is examined again
+        self._earlier: tuple[float, Array] | None = None  # with which a state is compared
+        self._moved = 0.0  # when it last moved
 
     @classmethod
     def applies_to(cls, scene: Scene) -> bool:
@@ -83,17 +87,16 @@ class Steady(Criterion):
         return outcome_at_rest(self._scene, history.membranes, history.state)
 
     def _at_rest(self, history: History) -> bool:
-        criteria = self._scene.criteria
-        time, rate = history.samples["time"], history.samples["state_rate"]
-        since = time[-1] - criteria.steady_time
-        if time[0] > since:
-            return False
-        for instant, value in zip(reversed(time), reversed(rate), strict=True):
-            if value > criteria.steady_rate:
-                return False
-            if instant <= since:
-                break
-        return True
+        criteria, time, state = self._scene.criteria, history.time, history.state
+        if self._earlier is None or self._earlier[1].shape != state.shape:  # the number of points has changed
+            self._earlier, self._moved = (time, state), time
+        duration = time - self._earlier[0]
+        # Over a short step the noise of the integrator would pass for motion.
+        if duration >= _COMPARED * criteria.steady_time:
+            if state_rate(history.membranes, state - self._earlier[1], duration) > criteria.steady_rate:
+                self._moved = time
+            self._earlier = time, state
+        return time - self._moved >= criteria.steady_time
 
 
 def outcome_at_rest(scene: Scene, membranes: Membranes, state: Array) -> Outcome:

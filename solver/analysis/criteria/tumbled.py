@@ -13,7 +13,11 @@ if TYPE_CHECKING:
 
 
 class Tumbled(Criterion):
-    """The long axis of a single vesicle has made ``revolutions`` full turns."""
+    """The long axis of a single vesicle has made ``revolutions`` full turns.
+
+    The run goes on until the durations of half turns repeat themselves within ``settled_change``, or to the
+    horizon.
+    """
 
     @classmethod
     def applies_to(cls, scene: Scene) -> bool:
@@ -40,6 +44,9 @@ class Tumbled(Criterion):
         -------
         Outcome or None
         """
-        assert history.long_axis
-        half_turns = len(history.long_axis.half_turns) - 1
-        return Outcome.TUMBLING if half_turns >= 2 * self._scene.criteria.revolutions else None
+        axis, criteria = history.long_axis, self._scene.criteria
+        assert axis
+        if axis.half_turns < 2 * criteria.revolutions:
+            return None
+        last = history.time >= self._scene.latest_time
+        return Outcome.TUMBLING if last or axis.has_settled(criteria.settled_change) else None

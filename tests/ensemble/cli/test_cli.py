@@ -24,10 +24,12 @@ ERRORS = INDICATORS | {"global", "period", "inclination_angle", "viscosity", "ti
 RUN_FIELDS = {
     "outcome",
     "failure",
+    "undecided",
     "time",
     "perturbations",
     "sensitive",
     "period",
+    "settled",
     "effective_aspect_ratio",
     "inclination_angle",
     "gap",

@@ -7,6 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.interpolate import CubicSpline
 
 from solver.analysis.run import Run
 from solver.flows import Shear, Trap
@@ -51,7 +54,13 @@ def computed(run: Run) -> dict[str, Any]:
         "last values": {name: values[-1] for name, values in run.series.items() if name != "state_rate"},
         "times": (run.time, work.smallest_step, run.error.temporal),
         "counts": counts,
+        "answers": answers(run),
     }
+
+
+def answers(run: Run) -> tuple[Any, ...]:
+    """What a run comes to."""
+    return run.outcome, run.undecided, run.period, run.settled, run.viscosity, run.inclination_angle, run.gap
 
 
 @pytest.mark.parametrize("integrator", ["bdf", "rosenbrock", "sdc", "imex-euler"])
@@ -63,6 +72,62 @@ def test_a_run_is_the_same_however_often_it_is_recorded(scene: str, integrator: 
     usual, other = (recorded(scene, integrator, each) for each in (Output(), output))
     assert len(other.series["time"]) != len(usual.series["time"])
     assert computed(other) == computed(usual)
+
+
+DECIDED = {
+    "bound": shear_pair(3.5, rate=2.0),
+    "separated": shear_pair(0.3, rate=1.0),
+    "tumbling": with_contrasts(
+        Scene(horizon=50.0, vesicles=(Vesicle(reduced_area=0.8),), flow=Shear(rate=2.0)), 15.0
+    ),
+    "trapped": uneven_pair(flow=Trap(rate=0.1), start=Start(relaxed=True, tilt=0.3), **fixed_horizon(300.0)),
+    "resting": uneven_pair(**fixed_horizon(300.0)),
+}
+
+
+@cache
+def recorded_every(scene: str, interval: float) -> Run:
+    output = Output(interval=interval, frame_interval=interval)
+    numerics = Numerics.model_validate(COARSE)
+    return simulate(DECIDED[scene].model_copy(update={"numerics": numerics, "output": output}))
+
+
+@pytest.mark.parametrize("scene", DECIDED)
+@given(interval=st.floats(0.1, 100.0))
+@settings(max_examples=6)
+def test_a_run_comes_to_the_same_however_often_it_is_recorded(scene: str, interval: float) -> None:
+    assert answers(recorded_every(scene, interval)) == answers(recorded_every(scene, 0.5))
+
+
+def test_these_runs_are_decided() -> None:
+    outcomes = {scene: recorded_every(scene, 0.5).outcome for scene in DECIDED}
+    assert outcomes == {
+        "bound": "bound",
+        "separated": "separated",
+        "tumbling": "tumbling",
+        "trapped": "bound",
+        "resting": "equilibrium",
+    }
+    assert recorded_every("bound", 0.5).settled
+    assert recorded_every("tumbling", 0.5).settled
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-4, 1e-5])
+def test_averages_are_as_accurate_as_the_run(tolerance: float) -> None:
+    """Against the converged run; and against fine samples of the same run, over the turn before its end."""
+    scene = shear_pair(3.5, rate=2.0, output=Output(interval=0.01))
+    run, converged = (
+        simulate(scene.model_copy(update={"numerics": Numerics(points=32, tolerance=each)}))
+        for each in (tolerance, 1e-8)
+    )
+    assert run.viscosity
+    assert converged.viscosity
+    assert run.period
+    assert run.viscosity.total == pytest.approx(converged.viscosity.total, rel=3 * tolerance)
+    series = run.series
+    sampled = series["viscosity_bending_tension"] + series["viscosity_adhesion"]
+    integral = CubicSpline(series["time"], sampled).integrate(run.time - run.period, run.time)
+    assert run.viscosity.total == pytest.approx(float(integral) / run.period, rel=tolerance)
 
 
 @pytest.mark.parametrize("scene", ["pair", "eight"])

@@ -30,7 +30,7 @@ class ShearDoublet(NamedTuple):
 
     @property
     def case(self) -> Case:
-        """The run that ends after two revolutions, or when the pair separates."""
+        """The run that ends when the motion has settled, or when the pair separates."""
         return Case.of("doublet-shear", self._changes)
 
     @property

@@ -1,0 +1,108 @@
+"""The intrinsic viscosity against time, at the ends of steps: for averages that no recording changes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from solver.analysis.diagnostics import viscosity_measures
+from solver.analysis.run import Viscosity
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from solver.integrators import Step
+    from solver.motion.equation import EquationOfMotion
+    from solver.scene import Scene
+
+Array = NDArray[np.float64]
+
+
+class ViscosityHistory:
+    """The parts of the intrinsic viscosity at the ends of steps, from a step on that is of interest.
+
+    Steps are as short as the motion needs, so a cubic spline through these values is as accurate as the run.
+
+    Parameters
+    ----------
+    scene : Scene
+        In shear.
+    equation : EquationOfMotion
+        Of this scene.
+    """
+
+    def __init__(self, scene: Scene, equation: EquationOfMotion) -> None:
+        self._scene = scene
+        self._times: list[float] = []
+        self._values: list[list[float]] = []
+        self.continue_with(equation)
+
+    def continue_with(self, equation: EquationOfMotion) -> None:
+        """Measure states with more points from now on.
+
+        Parameters
+        ----------
+        equation : EquationOfMotion
+            Of the same scene with more points.
+        """
+        self._equation = equation
+        self._measures = viscosity_measures(self._scene, equation)
+
+    def follow(self, step: Step) -> None:
+        """Take in a step, the first one with its start.
+
+        Parameters
+        ----------
+        step : Step
+        """
+        if not self._times:
+            self._take(step.start, step.interpolate(step.start))
+        self._take(step.end, step.state)
+
+    def average(self, first: float, last: float) -> Viscosity | None:
+        """Return the average over an interval.
+
+        Parameters
+        ----------
+        first, last : float
+            When it begins and ends; what was not followed is left out.
+
+        Returns
+        -------
+        Viscosity or None
+            None if nothing was followed in it.
+        """
+        if not self._times or first >= last:
+            return None
+        first = max(first, self._times[0])
+        integral = CubicSpline(self._times, self._values).integrate(first, last)
+        parts = dict(zip(self._measures, (integral / (last - first)).tolist(), strict=True))
+        return viscosity_of(parts)
+
+    def _take(self, time: float, state: Array) -> None:
+        motion = self._equation.motion(state)
+        self._times.append(time)
+        self._values.append([measure(motion) for measure in self._measures.values()])
+
+
+def viscosity_of(parts: Mapping[str, float]) -> Viscosity:
+    """Add up the parts of an intrinsic viscosity.
+
+    Parameters
+    ----------
+    parts : mapping
+        By the names of their series.
+
+    Returns
+    -------
+    Viscosity
+    """
+    return Viscosity(
+        total=sum(parts.values()),
+        bending_tension=parts["viscosity_bending_tension"],
+        adhesion=parts.get("viscosity_adhesion"),
+        contrast=parts.get("viscosity_contrast"),
+    )
