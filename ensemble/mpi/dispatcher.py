@@ -10,10 +10,12 @@ A blocking receive would spin and take the core from the simulation, so both sid
 
 from __future__ import annotations
 
+import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from heapq import heappop, heappush
 from typing import TYPE_CHECKING, Any, Generic, cast
 
 from ensemble.mpi.groups import Groups
@@ -32,6 +34,7 @@ _ORDERS = 1  # tag of messages to workers
 _REPORTS = 2  # tag of messages to the dispatcher
 _POLL_SECONDS = 0.002
 _CANCEL_CHECK_SECONDS = 0.02
+_PUBLISH_SECONDS = 0.5
 
 
 @dataclass(frozen=True)
@@ -209,7 +212,8 @@ class Dispatcher(Generic[SomeTask]):
     store : Store
         Where runs are committed.
     on_change : callable
-        Called with the progress whenever an outcome or an assignment changed something.
+        Called with the progress when outcomes or assignments have changed something, at most twice a second,
+        and at the end.
     meter : UsageMeter
         Measures what the groups do.
     """
@@ -228,55 +232,79 @@ class Dispatcher(Generic[SomeTask]):
         self._on_change = on_change
         self._meter = meter
         self._running: dict[int, SomeTask] = {}
-        self._idle: set[int] = set()
+        self._rank_of: dict[str, int] = {}  # of a task that is running, by its key
+        self._idle: list[int] = []  # a heap
         self._cancelled: set[str] = set()
         self._runs = 0
+        self._changed = False
+        self._next_publication = -math.inf
 
     def run(self) -> RunUsage:
         """Dispatch from the first report to the last order, and return what it took."""
         while len(self._idle) < self._communicator.Get_size() or not self._queue.done:
-            report, rank = self._wait()
-            self._take(report, rank)
+            for report, rank in self._reports():
+                self._take(report, rank)
             self._cancel_unneeded()
             self._assign()
-            self._on_change(self._progress())
+            self._changed = True
+            self._publish_if_due()
+        self._publish()
         for rank in self._idle:
             _send(self._communicator, Stop(), rank, _ORDERS)
         return RunUsage(self._runs, self._meter.elapsed, self._meter.fractions())
 
-    def _wait(self) -> tuple[WorkerReport, int]:
+    def _reports(self) -> Iterator[tuple[WorkerReport, int]]:
+        """Wait for a report; yield it and all others that have come."""
         while (received := _receive(self._communicator, _REPORTS)) is None:
+            self._publish_if_due()
             time.sleep(_POLL_SECONDS)
-        return cast(tuple[WorkerReport, int], received)
+        # Not more than one of each group: while reports keep coming the groups must get orders, too.
+        for _ in range(self._communicator.Get_size()):
+            yield cast(tuple[WorkerReport, int], received)
+            if (received := _receive(self._communicator, _REPORTS)) is None:
+                return
+        yield cast(tuple[WorkerReport, int], received)
+
+    def _publish_if_due(self) -> None:
+        if self._changed and time.monotonic() >= self._next_publication:
+            self._publish()
+
+    def _publish(self) -> None:
+        self._changed = False
+        self._on_change(self._progress())
+        self._next_publication = time.monotonic() + _PUBLISH_SECONDS
 
     def _take(self, report: WorkerReport, rank: int) -> None:
         match report:
             case Finished(staged, outcome, seconds):
-                task = self._running.pop(rank)
+                task = self._end(rank)
                 self._store.commit(staged)
                 self._queue.answer(task, outcome)
                 self._runs += 1
                 self._meter.record_run(rank, seconds)
             case Stopped(seconds):
-                self._queue.cancelled(self._running.pop(rank))
+                self._queue.cancelled(self._end(rank))
                 self._meter.record_run(rank, seconds)
-        self._idle.add(rank)
+        heappush(self._idle, rank)
+
+    def _end(self, rank: int) -> SomeTask:
+        task = self._running.pop(rank)
+        del self._rank_of[task.key]
+        return task
 
     def _cancel_unneeded(self) -> None:
-        unneeded = {task.key for task in self._queue.unneeded_tasks()}
-        for rank, task in self._running.items():
-            if task.key in unneeded - self._cancelled:
+        for task in self._queue.unneeded_tasks():
+            rank = self._rank_of.get(task.key)
+            if rank is not None and task.key not in self._cancelled:
                 _send(self._communicator, Cancel(task.key), rank, _ORDERS)
                 self._cancelled.add(task.key)
 
     def _assign(self) -> None:
-        for rank in sorted(self._idle):
-            task = self._queue.next_task()
-            if task is None:
-                break
+        while self._idle and (task := self._queue.next_task()) is not None:
+            rank = heappop(self._idle)
             self._cancelled.discard(task.key)
             self._running[rank] = task
-            self._idle.remove(rank)
+            self._rank_of[task.key] = rank
             _send(self._communicator, task, rank, _ORDERS)
         self._meter.record_idle(len(self._idle))
 

@@ -81,7 +81,7 @@ def run_study(
     store : Store or RunStaging
         From `store_on_ranks`; rank 0 commits.
     on_change : callable
-        Called on rank 0, in the dispatcher's thread, whenever an outcome or an assignment changed something.
+        Called on rank 0, in the dispatcher's thread, at most twice a second and at the end.
     ranks_per_run : int
         How many ranks compute a run together.
 
@@ -124,7 +124,7 @@ def run_batch(
     store : Store or RunStaging
         From `store_on_ranks`; rank 0 commits.
     on_change : callable
-        Called on rank 0, in the dispatcher's thread, whenever an outcome or an assignment changed something.
+        Called on rank 0, in the dispatcher's thread, at most twice a second and at the end.
     ranks_per_run : int
         How many ranks compute a run together.
 
@@ -170,8 +170,8 @@ def run_queue(
     begin : callable
         Returns the queue; called on rank 0.
     publish : callable
-        Called on rank 0, in the dispatcher's thread, with the queue and its progress, whenever an outcome or
-        an assignment changed something.
+        Called on rank 0, in the dispatcher's thread, with the queue and its progress, at most twice
+        a second and at the end.
     conclude : callable
         Returns what is wanted of the queue once it is done; called on rank 0.  What it returns is pickled.
 

@@ -44,6 +44,8 @@ class UsageMeter:
         self._clock = clock
         self._start = clock()
         self._intervals: list[list[tuple[float, float]]] = [[] for _ in range(groups)]
+        self._runs = 0
+        self._seconds = 0.0
         self._first_idle: float | None = None
 
     @property
@@ -54,8 +56,7 @@ class UsageMeter:
     @property
     def mean_run(self) -> float | None:
         """Mean seconds of the runs so far; None before the first."""
-        runs = [end - begin for intervals in self._intervals for begin, end in intervals]
-        return sum(runs) / len(runs) if runs else None
+        return self._seconds / self._runs if self._runs else None
 
     def record_run(self, group: int, seconds: float) -> None:
         """Record that a group has just finished a simulation.
@@ -69,6 +70,8 @@ class UsageMeter:
         """
         now = self._clock()
         self._intervals[group].append((now - seconds, now))
+        self._runs += 1
+        self._seconds += seconds
 
     def record_idle(self, groups: int) -> None:
         """Record how many groups wait although every useful run is being made.
