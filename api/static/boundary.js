@@ -1,7 +1,7 @@
 /** A boundary: its phase diagram, its points, its runs, and values read from it. */
 
 import { changesOf, get } from "./api.js";
-import { phaseDiagram } from "./diagram.js";
+import { otherChanges, phaseDiagram } from "./diagram.js";
 import { definitions, element, table } from "./dom.js";
 import { interval, number, words } from "./format.js";
 import { outcomeLabel } from "./outcomes.js";
@@ -168,8 +168,9 @@ function pointsTable(boundary) {
   const { scene, sweep, search } = boundary.study;
   const rows = boundary.points.map((point) => [
     number(point.parameters[sweep.parameter]),
-    interval(point.bracket),
+    [point, ...otherChanges(point)].map(({ bracket }) => interval(bracket)).join("; also "),
     element("span", { class: `state ${stateOf(point)}` }, point.certified ? "certified" : point.status),
+    scannedText(point),
   ]);
   return table(
     "Points of the boundary",
@@ -177,9 +178,21 @@ function pointsTable(boundary) {
       quantity(sweep.parameter, scene).symbol,
       `Critical ${quantity(search.parameter, scene).symbol}`,
       "Status",
+      "Scanned",
     ],
     rows,
   );
+}
+
+/**
+ * Say how many values were looked at beside the brackets, and how wide an unseen window may be.
+ *
+ * @param {Point} point
+ */
+function scannedText({ scanned }) {
+  return scanned === null
+    ? "–"
+    : `${scanned.values} values, unseen ≤ ×${number(scanned.widest_unseen, 3)}`;
 }
 
 /** @param {Point} point */

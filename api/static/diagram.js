@@ -19,6 +19,8 @@ import { color } from "./theme.js";
  * @property {number | null} critical_value
  * @property {[string | null, string | null]} outcomes
  * @property {string} status
+ * @property {{bracket: [number, number], outcomes: [string, string]}[]} changes - All that were found.
+ * @property {{values: number, looked_at: number[], widest_unseen: number} | null} scanned
  * @property {boolean} certified
  * @property {string[]} runs
  *
@@ -56,6 +58,7 @@ export function phaseDiagram(boundary, marks) {
       ...fitLine(boundary, points, x.symbol, y.symbol),
       ...runs(marks, x.symbol, y.symbol),
       ...brackets(boundary, points),
+      ...otherBrackets(boundary),
     ],
     layout: {
       height: 480,
@@ -140,22 +143,7 @@ function brackets(boundary, points) {
   }
   const ends = points.map((point) => /** @type {[number, number]} */ (point.bracket));
   const certified = points.filter((point) => point.certified).length;
-  const bars = {
-    type: "scatter",
-    mode: "lines",
-    x: points.map((point) => at(point, boundary)),
-    y: ends.map(([low, high]) => (low + high) / 2),
-    line: { width: 0 },
-    error_y: {
-      type: "data",
-      array: ends.map(([low, high]) => (high - low) / 2),
-      color: color("ink"),
-      thickness: 1.2,
-      width: 8,
-    },
-    hoverinfo: "skip",
-    showlegend: false,
-  };
+  const bars = barsOf(points.map((point) => at(point, boundary)), ends, "ink");
   const inLegend = {
     type: "scatter",
     mode: "markers",
@@ -165,6 +153,57 @@ function brackets(boundary, points) {
     marker: { symbol: "line-ns-open", size: 12, line: { width: 1.2 }, color: color("ink") },
   };
   return [bars, inLegend];
+}
+
+/**
+ * @param {number[]} x
+ * @param {[number, number][]} ends
+ * @param {string} name - Of a color.
+ */
+function barsOf(x, ends, name) {
+  return {
+    type: "scatter",
+    mode: "lines",
+    x,
+    y: ends.map(([low, high]) => (low + high) / 2),
+    line: { width: 0 },
+    error_y: {
+      type: "data",
+      array: ends.map(([low, high]) => (high - low) / 2),
+      color: color(name),
+      thickness: 1.2,
+      width: 8,
+    },
+    hoverinfo: "skip",
+    showlegend: false,
+  };
+}
+
+/**
+ * The changes of the outcome at a point that are not within its bracket.
+ *
+ * @param {Point} point
+ */
+export function otherChanges({ bracket: [low, high], changes }) {
+  return changes.filter(
+    ({ bracket: [from, to] }) => (low !== null && from < low) || (high !== null && to > high),
+  );
+}
+
+/** @param {Boundary} boundary */
+function otherBrackets(boundary) {
+  const places = boundary.points.flatMap((point) =>
+    otherChanges(point).map(({ bracket }) => ({ x: at(point, boundary), bracket })),
+  );
+  if (places.length === 0) {
+    return [];
+  }
+  const bars = barsOf(
+    places.map(({ x }) => x),
+    places.map(({ bracket }) => bracket),
+    "separated",
+  );
+  return [{ ...bars, name: "another change of the outcome", showlegend: true }];
 }
 
 /**

@@ -36,6 +36,7 @@ const LABELS = /** @type {Record<string, string>} */ ({
   "arrangement.reduced_area": "reduced area ΔA",
   "arrangement.seed": "seed of the places",
   "search.limits": "limits of the search",
+  "search.scan": "values scanned in a decade",
   "search.tolerance": "relative width of a bracket",
   "search.certify": "certify the brackets",
 });

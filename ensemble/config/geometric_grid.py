@@ -9,11 +9,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from decimal import Context
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 # A library's binary power may differ in the last bit from machine to machine; correctly rounded decimal
 # arithmetic with digits to spare does not.
 _DECIMAL = Context(prec=34)
+
+
+@lru_cache(8192)
+def _grid_value(index: int, points_per_decade: int) -> float:
+    return float(_DECIMAL.power(10, _DECIMAL.divide(index, points_per_decade)))
 
 
 @dataclass(frozen=True)
@@ -58,7 +63,7 @@ class GeometricGrid:
         float
             The same to the last bit on every machine.
         """
-        return float(_DECIMAL.power(10, _DECIMAL.divide(index, self.points_per_decade)))
+        return _grid_value(index, self.points_per_decade)
 
     def nearest(self, value: float) -> int:
         """Return the index of the grid value whose ratio to a value is closest to 1.

@@ -61,6 +61,9 @@ class Search(Model):
         Outcomes below the critical value.
     high : tuple of Outcome
         Outcomes above the critical value.
+    scan : int
+        How many values in a decade are looked at all over the limits, from 0 to 100, so that other changes
+        of the outcome are seen.  With 0 a search ends with the first change that it finds.
     certify : bool
         Whether both ends of every bracket are run again at finer numerics.
     """
@@ -71,6 +74,7 @@ class Search(Model):
     guesses: tuple[Guess, ...] = ()
     low: tuple[Outcome, ...] = Field(min_length=1)
     high: tuple[Outcome, ...] = Field(min_length=1)
+    scan: int = Field(2, ge=0, le=100)
     certify: bool = False
 
     @field_validator("limits")
@@ -80,6 +84,13 @@ class Search(Model):
         if tolerance is not None and len(GeometricGrid(tolerance).within(*limits)) < 2:
             raise ValueError(f"must be further apart than the tolerance {tolerance}")
         return limits
+
+    @field_validator("certify")
+    @classmethod
+    def _includes_a_scan(cls, certify: bool, info: ValidationInfo) -> bool:
+        if certify and info.data.get("scan") == 0:
+            raise ValueError("needs search.scan of at least 1: what nobody has looked for is not certified")
+        return certify
 
     @field_validator("low", "high")
     @classmethod

@@ -210,11 +210,12 @@ def report_progress(console: Console) -> Iterator[Callable[[str], None]]:
 
 def _table(snapshot: Snapshot) -> Table:
     points = snapshot.boundary.points
-    table = Table(*boundary_columns(points), "running")
+    columns = boundary_columns(points)
+    table = Table(*columns, "running")
     for point in points:
         (at,) = point.parameters.values()
         values = sorted(task.value for task in snapshot.progress.running.values() if task.sweep_value == at)
-        table.add_row(*boundary_cells(point), ", ".join(f"{value:.6g}" for value in values))
+        table.add_row(*boundary_cells(point, columns), ", ".join(f"{value:.6g}" for value in values))
     return table
 
 

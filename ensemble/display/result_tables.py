@@ -9,7 +9,7 @@ from rich.markup import escape
 from rich.table import Column, Table
 
 if TYPE_CHECKING:
-    from ensemble.search.boundary import Boundary, BoundaryPoint
+    from ensemble.search.boundary import Boundary, BoundaryPoint, OutcomeChange
     from ensemble.store.run_record import RunSummary
 
 _ABSENT = "–"
@@ -27,30 +27,36 @@ def boundary_columns(points: Sequence[BoundaryPoint]) -> list[str]:
     -------
     list of str
     """
-    return [*points[0].parameters, "critical value", "bracket", "outcomes", "status", "certified by", "runs"]
+    others = ["other changes"] if any(point.other_changes for point in points) else []
+    headings = ["critical value", "bracket", "outcomes", "status", *others, "scanned", "certified by", "runs"]
+    return [*points[0].parameters, *headings]
 
 
-def boundary_cells(point: BoundaryPoint) -> list[str]:
+def boundary_cells(point: BoundaryPoint, columns: Sequence[str]) -> list[str]:
     """Return one point of a boundary as the cells of a row.
 
     Parameters
     ----------
     point : BoundaryPoint
         The point.
+    columns : sequence of str
+        From `boundary_columns`.
 
     Returns
     -------
     list of str
     """
-    return [
-        *(_number(value) for value in point.parameters.values()),
-        _number(point.critical_value),
-        bracket_text(point),
-        " | ".join(outcome or "?" for outcome in point.outcomes),
-        point.status,
-        _certifying_numerics(point),
-        str(len(point.runs)),
-    ]
+    cells = {name: _number(value) for name, value in point.parameters.items()} | {
+        "critical value": _number(point.critical_value),
+        "bracket": bracket_text(point),
+        "outcomes": " | ".join(outcome or "?" for outcome in point.outcomes),
+        "status": point.status,
+        "other changes": "; ".join(map(_change, point.other_changes)) or _ABSENT,
+        "scanned": _scanned(point),
+        "certified by": _certifying_numerics(point),
+        "runs": str(len(point.runs)),
+    }
+    return [cells[column] for column in columns]
 
 
 def bracket_text(point: BoundaryPoint) -> str:
@@ -66,6 +72,17 @@ def bracket_text(point: BoundaryPoint) -> str:
     str
     """
     return " – ".join("?" if end is None else f"{end:.6g}" for end in point.bracket)
+
+
+def _change(change: OutcomeChange) -> str:
+    low, high = change.bracket
+    return f"{low:.6g} – {high:.6g} ({' | '.join(change.outcomes)})"
+
+
+def _scanned(point: BoundaryPoint) -> str:
+    """Say how many values were looked at beside the brackets, and how wide an unseen window may be."""
+    scanned = point.scanned
+    return _ABSENT if scanned is None else f"{scanned.values} values, unseen ≤ ×{scanned.widest_unseen:.3g}"
 
 
 def _certifying_numerics(point: BoundaryPoint) -> str:
@@ -85,9 +102,10 @@ def boundary_table(boundary: Boundary) -> Table:
     -------
     Table
     """
-    table = Table(*map(_folded, boundary_columns(boundary.points)), title=escape(boundary.name))
+    columns = boundary_columns(boundary.points)
+    table = Table(*map(_folded, columns), title=escape(boundary.name))
     for point in boundary.points:
-        table.add_row(*boundary_cells(point))
+        table.add_row(*boundary_cells(point, columns))
     return table
 
 

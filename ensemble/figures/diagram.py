@@ -7,9 +7,10 @@ from collections.abc import Sequence
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from ensemble.figures.style import BLACK, GRAY, MARKS, STYLE, WIDTH
+from ensemble.figures.style import BLACK, GRAY, MARKS, STYLE, VERMILLION, WIDTH
 from ensemble.figures.symbols import Quantity, describe, quantity
 from ensemble.search.boundary import Boundary, BoundaryPoint
 from ensemble.search.critical_value import SearchStatus
@@ -32,7 +33,8 @@ def phase_diagram(boundary: Boundary, runs: Sequence[tuple[float, float, Outcome
     Returns
     -------
     Figure
-        The group ids of its artists are ``run <outcome>``, ``bracket``, ``boundary`` and ``fit``.
+        The group ids of its artists are ``run <outcome>``, ``bracket``, ``other change``, ``boundary`` and
+        ``fit``.
     """
     swept = boundary.study["sweep"]["parameter"]
     searched = boundary.study["search"]["parameter"]
@@ -48,6 +50,7 @@ def phase_diagram(boundary: Boundary, runs: Sequence[tuple[float, float, Outcome
     if bracketed:
         _draw_brackets(axes, bracketed, swept)
         _draw_boundary(axes, bracketed, swept, y)
+    _draw_other_changes(axes, points, swept)
     converged = [point for point in bracketed if point.status == SearchStatus.CONVERGED]
     if (line := line_through(boundary)) is not None:
         _draw_fit(axes, line, [point.parameters[swept] for point in converged], x, y)
@@ -75,22 +78,39 @@ def _draw_runs(axes: Axes, runs: Sequence[tuple[float, float, Outcome]]) -> None
             )
 
 
-def _draw_brackets(axes: Axes, bracketed: Sequence[BoundaryPoint], swept: str) -> None:
-    ends = np.array([point.bracket for point in bracketed], dtype=float)
-    certified = sum(point.certified for point in bracketed)
+def _draw_other_changes(axes: Axes, points: Sequence[BoundaryPoint], swept: str) -> None:
+    """Draw the brackets of changes that are not the answer, where a point has several."""
+    places = [
+        (point.parameters[swept], *change.bracket) for point in points for change in point.other_changes
+    ]
+    if places:
+        sweep, low, high = np.array(places).T
+        _bars(axes, sweep, low, high, VERMILLION, "another change of the outcome").set_gid("other change")
+
+
+def _bars(axes: Axes, sweep: Array, low: Array, high: Array, color: str, label: str) -> LineCollection:
     _, _, (bars,) = axes.errorbar(
-        [point.parameters[swept] for point in bracketed],
-        ends.mean(axis=1),
-        yerr=np.ptp(ends, axis=1) / 2,
+        sweep,
+        (low + high) / 2,
+        yerr=(high - low) / 2,
         fmt="none",
-        ecolor=BLACK,
+        ecolor=color,
         elinewidth=1.0,
         capsize=5.5,
         capthick=1.0,
         zorder=3,
-        label=f"bracket ({certified} of {len(bracketed)} certified)",
+        label=label,
     )
-    bars.set_gid("bracket")
+    return bars
+
+
+def _draw_brackets(axes: Axes, bracketed: Sequence[BoundaryPoint], swept: str) -> None:
+    ends = np.array([point.bracket for point in bracketed], dtype=float)
+    certified = sum(point.certified for point in bracketed)
+    sweep = np.array([point.parameters[swept] for point in bracketed])
+    label = f"bracket ({certified} of {len(bracketed)} certified)"
+    low, high = ends.T
+    _bars(axes, sweep, low, high, BLACK, label).set_gid("bracket")
 
 
 def _draw_boundary(axes: Axes, bracketed: Sequence[BoundaryPoint], swept: str, y: Quantity) -> None:

@@ -54,7 +54,7 @@ class StudyQuestion(Question[Study]):
     collection = "boundaries"
     answer_title = "diagram"
     answer_grows = True
-    principal_fields = ("sweep.values", "search.limits", "search.tolerance", "search.certify")
+    principal_fields = ("sweep.values", "search.limits", "search.tolerance", "search.scan", "search.certify")
 
     @classmethod
     def check_size(cls, document: Any) -> None:
@@ -74,10 +74,15 @@ class StudyQuestion(Question[Study]):
         return self.document.key
 
     def planned_runs(self) -> Iterator[tuple[Scene, int]]:
-        """See `Question`.  A search runs both limits and then halves the distance between them."""
+        """See `Question`.
+
+        Counted are the values of the scan all over the limits, those of a bisection, and both ends.
+        """
         study = self.document
-        candidates = len(study.search.grid.within(*study.search.limits))
-        searching = math.ceil(math.log2(candidates)) + _ENDS
+        low, high = study.search.limits
+        candidates = math.log(high / low) / math.log1p(study.search.tolerance)
+        scanning = math.ceil(study.search.scan * math.log10(high / low))
+        searching = scanning + math.ceil(math.log2(max(candidates, 2))) + _ENDS
         for sweep_value in study.sweep.values:
             scenes = [study.scene_at(sweep_value, limit) for limit in study.search.limits]
             costliest = max(scenes, key=run_work)
@@ -232,6 +237,7 @@ class _TracedBoundary(Answer):
         return {
             "study": boundary.name,
             "boundary": [point.model_dump(mode="json") for point in boundary.points],
+            "criteria": boundary.study["scene"]["criteria"],
             "wall_seconds": usage.wall_seconds,
             "busy_fraction": fmean(usage.busy_fractions) if usage.busy_fractions else None,
             "store": str(self.store),

@@ -19,6 +19,44 @@ def _bracket_mean(fields: dict[str, Any]) -> float | None:
     return None if low is None or high is None else math.sqrt(low) * math.sqrt(high)
 
 
+class OutcomeChange(BaseModel):
+    """Two values between which the outcome of runs changes.
+
+    Attributes
+    ----------
+    bracket : (float, float)
+        The two values.
+    outcomes : (str, str)
+        Of their runs.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    bracket: tuple[Annotated[float, Field(ge=0)], Annotated[float, Field(ge=0)]]
+    outcomes: tuple[str, str]
+
+
+class Scanned(BaseModel):
+    """How far a search has looked beside the brackets that it has found.
+
+    Attributes
+    ----------
+    values : int
+        How many further values were tried.  All of them lie on the sides that the brackets give them.
+    looked_at : list of float
+        These values, ascending.
+    widest_unseen : float
+        Largest ratio of two neighbors among all values tried, and the limits.  A window of another outcome
+        within the limits would have been seen if the ratio of its ends were larger.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    values: int
+    looked_at: list[float]
+    widest_unseen: float
+
+
 class BoundaryPoint(BaseModel):
     """The bracket of the critical value at one value of the swept parameter.
 
@@ -34,6 +72,11 @@ class BoundaryPoint(BaseModel):
         At the two ends of the bracket; if it is certified, those of the finer runs.
     status : str
         What the search, or the certification, has come to.
+    changes : list of OutcomeChange
+        All changes of the outcome that were found within the limits, ascending: those of the bracket and,
+        where there are several, the others.
+    scanned : Scanned or None
+        How far the search has looked beside them; None until it has, or if it does not.
     certified : bool
         Whether both ends were run again at finer numerics and came out on the same sides.
     certified_by : Numerics or None
@@ -49,9 +92,22 @@ class BoundaryPoint(BaseModel):
     critical_value: float | None = Field(default_factory=_bracket_mean)
     outcomes: tuple[str | None, str | None]
     status: str
+    changes: list[OutcomeChange] = []
+    scanned: Scanned | None = None
     certified: bool
     certified_by: Numerics | None = None
     runs: list[str]
+
+    @property
+    def other_changes(self) -> list[OutcomeChange]:
+        """The changes of the outcome that are not within the bracket."""
+        low, high = self.bracket
+        return [
+            change
+            for change in self.changes
+            if (low is not None and change.bracket[0] < low)
+            or (high is not None and change.bracket[1] > high)
+        ]
 
 
 class Boundary(BaseModel):

@@ -15,6 +15,7 @@ many workers or in which order the answers were found:
 
 from __future__ import annotations
 
+import copy
 import math
 from dataclasses import dataclass
 from enum import StrEnum
@@ -105,6 +106,35 @@ class _CauchyPrior:
         return self.center + tangent
 
 
+def indices_within(grid: GeometricGrid, limits: tuple[float, float]) -> range:
+    """Return the indices of the values that a search may try.
+
+    Parameters
+    ----------
+    grid : GeometricGrid
+        That of the search.
+    limits : (float, float)
+        Those of the search.
+
+    Returns
+    -------
+    range
+        At least two.
+
+    Raises
+    ------
+    ValueError
+        If they are not 0 < low < high, or hold fewer than two values.
+    """
+    low, high = limits
+    if not 0 < low < high < math.inf:
+        raise ValueError(f"limits: [{low}, {high}] — must be 0 < low < high")
+    indices = grid.within(low, high)
+    if indices.stop - indices.start < 2:
+        raise ValueError(f"limits: [{low}, {high}] — hold no two values {grid.tolerance} apart")
+    return indices
+
+
 class CriticalValueSearch:
     """The search for a critical value on a grid, within limits.
 
@@ -126,16 +156,17 @@ class CriticalValueSearch:
     def __init__(
         self, grid: GeometricGrid, limits: tuple[float, float], guess: tuple[float, float] | None = None
     ) -> None:
-        low, high = limits
-        if not 0 < low < high < math.inf:
-            raise ValueError(f"limits: [{low}, {high}] — must be 0 < low < high")
         self._grid = grid
-        self._indices = grid.within(low, high)
-        if len(self._indices) < 2:
-            raise ValueError(f"limits: [{low}, {high}] — hold no two values {grid.tolerance} apart")
+        self._indices = indices_within(grid, limits)
         self._sides: dict[int, Side] = {}
         self._pending: set[int] = set()
         self._prior: _Prior = _UniformPrior() if guess is None else self._prior_of(guess)
+
+    def copy(self) -> CriticalValueSearch:
+        """Return a search that has come as far as this one and goes on without it."""
+        other = copy.copy(self)
+        other._sides, other._pending = dict(self._sides), set(self._pending)
+        return other
 
     def ask(self) -> float | None:
         """Return the most useful value to try now and mark it as pending.
@@ -215,14 +246,14 @@ class CriticalValueSearch:
 
     def unneeded(self) -> frozenset[float]:
         """Return the pending values whose answers can no longer narrow the bracket."""
-        low, high = self._ends()
+        low, high = self.ends()
         done = self.done
         return frozenset(self._grid.value(index) for index in self._pending if done or not low < index < high)
 
     @property
     def bracket(self) -> tuple[float | None, float | None]:
         """The largest value known to be low and the smallest known to be high; None where unknown."""
-        low, high = self._ends()
+        low, high = self.ends()
         return (
             self._grid.value(low) if low in self._indices else None,
             self._grid.value(high) if high in self._indices else None,
@@ -231,7 +262,7 @@ class CriticalValueSearch:
     @property
     def contradictions(self) -> tuple[float, ...]:
         """The lows above a high and the highs below a low, ascending; empty unless non-monotone."""
-        low, high = self._ends()
+        low, high = self.ends()
         return tuple(
             self._grid.value(index)
             for index in self._known_between(low, high)
@@ -245,7 +276,7 @@ class CriticalValueSearch:
             return SearchStatus.NON_MONOTONE
         if self._regions():
             return SearchStatus.SEARCHING
-        low, high = self._ends()
+        low, high = self.ends()
         if high - low > 1:
             failed = Side.FAILED in (self._sides[low + 1], self._sides[high - 1])
             return SearchStatus.FAILED if failed else SearchStatus.UNDECIDED
@@ -256,6 +287,23 @@ class CriticalValueSearch:
     def done(self) -> bool:
         """Whether no further answer is needed."""
         return self.status is not SearchStatus.SEARCHING
+
+    @property
+    def has_certain(self) -> bool:
+        """Whether no value is pending, so that the next one is needed whatever else comes."""
+        return not self._pending
+
+    @property
+    def answers_left(self) -> float:
+        """How many more answers are needed if each halves the bracket; 0 once done."""
+        low, high = self.ends()
+        return 0.0 if self.done else max(1.0, math.log2(high - low))
+
+    @property
+    def changes(self) -> tuple[tuple[float, float], ...]:
+        """The bracket, if both of its ends are known."""
+        low, high = self.bracket
+        return () if low is None or high is None else ((low, high),)
 
     def _prior_of(self, guess: tuple[float, float]) -> _Prior:
         low, high = guess
@@ -271,8 +319,13 @@ class CriticalValueSearch:
             raise ValueError(f"{value!r} is outside the limits [{first}, {last}]")
         return index
 
-    def _ends(self) -> tuple[int, int]:
-        """Return the indices of the bracket's ends, one beyond the limits where an end is unknown."""
+    def ends(self) -> tuple[int, int]:
+        """Return the indices of the bracket's ends, one beyond the limits where an end is unknown.
+
+        Returns
+        -------
+        (int, int)
+        """
         lows = [index for index, side in self._sides.items() if side is Side.LOW]
         highs = [index for index, side in self._sides.items() if side is Side.HIGH]
         below, above = self._indices[0] - 1, self._indices[-1] + 1
@@ -292,7 +345,7 @@ class CriticalValueSearch:
         """
         if self.contradictions:
             return []
-        low, high = self._ends()
+        low, high = self.ends()
         unanswered = self._known_between(low, high)
         gaps = [gap for gap in pairwise([low, *unanswered, high]) if gap[1] - gap[0] > 1]
         if not gaps:

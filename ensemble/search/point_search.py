@@ -146,9 +146,10 @@ class PointSearch(Generic[SomeValueSearch]):
         """Return the task of the most useful value to try; None if there is none."""
         while (value := self.search.ask()) is not None:
             # Another study on the same store may have made this run in the meantime.
-            if not self.take_known(value):
-                self._pending[value] = self._task(value)
-                return self._pending[value]
+            task = self._task(value)
+            if not self._take_known(task):
+                self._pending[value] = task
+                return task
         return None
 
     def take_known(self, value: float) -> bool:
@@ -164,13 +165,7 @@ class PointSearch(Generic[SomeValueSearch]):
         bool
             Whether it has been made before.
         """
-        task = self._task(value)
-        outcome = self._known(task.key)
-        if outcome is None:
-            return False
-        self._take(task, outcome)
-        self.known_answers += 1
-        return True
+        return self._take_known(self._task(value))
 
     def take_all_known(self) -> None:
         """Take the answers for all values that the search asks for, as far as their runs exist already."""
@@ -206,6 +201,14 @@ class PointSearch(Generic[SomeValueSearch]):
     def _task(self, value: float) -> SearchRun:
         scene = self._scene_at(value)
         return SearchRun(sweep_value=self.sweep_value, value=value, scene=scene, key=run_key(scene))
+
+    def _take_known(self, task: SearchRun) -> bool:
+        outcome = self._known(task.key)
+        if outcome is None:
+            return False
+        self._take(task, outcome)
+        self.known_answers += 1
+        return True
 
     def _take(self, task: SearchRun, outcome: Outcome) -> None:
         self.search.tell(task.value, self._side(outcome))

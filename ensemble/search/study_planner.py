@@ -1,40 +1,35 @@
-"""Decides which run of a study is the most useful one to make next.  Pure: no MPI, no files, no clock."""
+"""Decides which run of a study is the most useful one to make next.  Pure: no MPI, no files, no clock.
+
+Between two reports only the point that they are about is looked at, so that the time for a report grows with
+the logarithm of the number of points.
+"""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterable, Iterator
-from functools import partial
+from bisect import bisect_left, insort
+from collections.abc import Callable, Iterable
+from heapq import heappop, heappush
 
-from ensemble.config.certifying_scene import certifying_scene
 from ensemble.config.dotted_paths import parameter_value
 from ensemble.config.study import Study
 from ensemble.search.boundary import Boundary, BoundaryPoint
-from ensemble.search.certification import Certification, CertificationResult
-from ensemble.search.critical_value import CriticalValueSearch, SearchStatus
-from ensemble.search.point_search import PointSearch, SearchRun
-from ensemble.search.study_search import (
-    certification_of,
-    critical_value_search,
-    expected_bracket,
-    side_of,
-)
+from ensemble.search.point_search import SearchRun
+from ensemble.search.study_point import StudyPoint
+from ensemble.search.study_search import expected_bracket
 from ensemble.timestamp import now
 from solver.analysis.run import Outcome
 from solver.scene import Scene
 
-_AnyPointSearch = PointSearch[CriticalValueSearch] | PointSearch[Certification]
-
-ENDS = 2  # of a bracket, hence runs of a certification that finds both where they were
+_NEIGHBORS = 2  # on either side, from which a bracket is expected
 
 
 class StudyPlanner:
     """The task queue of a study: all of its searches and the certifications of their brackets.
 
-    Searches are worked on in the order of the sweep, one task each before any gets a second one: two workers
+    Points are worked on in the order of the sweep, one task each before any gets a second one: two workers
     get further on two searches than on one, and finished searches show the later ones where to begin.  When
-    there are more workers than searches left, several values of one search are tried at once.  Certifications
-    come before that, because their runs are needed whatever the others come to.
+    there are more workers than runs that are needed in any case, those are made that one outcome of a pending
+    run would make needed.
 
     Parameters
     ----------
@@ -51,22 +46,38 @@ class StudyPlanner:
         self, study: Study, known: Callable[[str], Outcome | None], made: Iterable[Scene] = ()
     ) -> None:
         self._study = study
-        self._known = known
-        grid = study.search.grid
-        self._values = {grid.value(index) for index in grid.within(*study.search.limits)}
-        self._searches = {
-            at: PointSearch(
-                critical_value_search(study), at, partial(study.scene_at, at), partial(side_of, study), known
-            )
-            for at in study.sweep.values
-        }
-        self._certifications: dict[float, PointSearch[Certification]] = {}
+        self._grid = study.search.grid
+        self._indices = self._grid.within(*study.search.limits)
+        self._points = {at: StudyPoint(study, at, known) for at in study.sweep.values}
         for at, value in set(filter(None, map(self._place, made))):
-            self._searches[at].take_known(value)
+            self._points[at].take_known(value)
+        self._order = {at: order for order, at in enumerate(self._points)}
+        # Entries of the queue whose number is no longer that of their point are out of date.
+        self._queue: list[tuple[tuple[bool, bool, int], int, int, float]] = []
+        self._entries = dict.fromkeys(self._points, 0)
+        self._open: set[float] = set()
+        self._unneeded: dict[float, tuple[SearchRun, ...]] = {}
+        self._documents: dict[float, BoundaryPoint] = {}
+        self._converged: dict[float, tuple[float, float]] = {}
+        self._converged_at: list[float] = []  # ascending
+        for at in self._points:
+            self._look_at(at)
 
     def next_task(self) -> SearchRun | None:
         """See `TaskQueue`."""
-        return next((task for task in map(self._next_of, self._by_usefulness()) if task is not None), None)
+        while self._queue:
+            _, _, entry, at = heappop(self._queue)
+            if entry != self._entries[at]:
+                continue
+            point = self._points[at]
+            if point.is_new and (guess := self._expected_bracket(at)) is not None:
+                point.replace_guess(guess)
+            task = point.next_task()
+            # A point without a task has none until it gets another answer.
+            self._look_at(at, again=task is not None)
+            if task is not None:
+                return task
+        return None
 
     def answer(self, task: SearchRun, outcome: Outcome) -> None:
         """See `TaskQueue`.
@@ -78,7 +89,8 @@ class StudyPlanner:
         outcome : Outcome
             Of its run.
         """
-        self._point_search_of(task).answer(task, outcome)
+        self._points[task.sweep_value].answer(task, outcome)
+        self._look_at(task.sweep_value)
 
     def cancelled(self, task: SearchRun) -> None:
         """See `TaskQueue`.
@@ -88,46 +100,37 @@ class StudyPlanner:
         task : SearchRun
             A task that is handed out.
         """
-        self._point_search_of(task).cancelled(task)
+        self._points[task.sweep_value].cancelled(task)
+        self._look_at(task.sweep_value)
 
     def unneeded_tasks(self) -> tuple[SearchRun, ...]:
         """See `TaskQueue`."""
-        needed = list(self._point_searches())
-        # A late answer may have shown that there is no single critical value, hence nothing to certify.
-        abandoned = [
-            point_search for point_search in self._certifications.values() if point_search not in needed
-        ]
-        return (
-            *(task for point_search in needed for task in point_search.unneeded_tasks()),
-            *(task for point_search in abandoned for task in point_search.pending.values()),
-        )
+        return tuple(task for tasks in self._unneeded.values() for task in tasks)
 
     @property
     def done(self) -> bool:
         """Whether no search and no certification needs a further answer."""
-        return all(point_search.search.done for point_search in self._point_searches())
+        return not self._open
 
     @property
     def known_answers(self) -> int:
         """See `TaskQueue`."""
-        return sum(point_search.known_answers for point_search in self._point_searches())
+        return sum(point.known_answers for point in self._points.values())
 
     @property
     def runs_left(self) -> float:
-        """How many more answers are needed if each halves a bracket or certifies an end of one."""
-        searching = [at for at, search in self._searches.items() if not search.search.done]
-        ends = sum(certification.search.ends_left for certification in self._certifying())
-        if self._study.search.certify:
-            ends += ENDS * len(searching)
-        return sum(map(self._halvings, searching)) + ends
+        """How many more answers are expected to be needed."""
+        return sum(self._points[at].runs_left for at in self._open)
 
     def boundary(self) -> Boundary:
         """Return the boundary as far as it is known."""
+        for at in self._points.keys() - self._documents.keys():
+            self._documents[at] = self._points[at].boundary_point()
         return Boundary(
             study_key=self._study.key,
             study=self._study.model_dump(mode="json"),
             name=self._study.name,
-            points=[self._point(at) for at in self._study.sweep.values],
+            points=[self._documents[at] for at in self._points],
             updated=now(),
         )
 
@@ -136,89 +139,36 @@ class StudyPlanner:
         try:
             at = parameter_value(scene, self._study.sweep.parameter)
             value = parameter_value(scene, self._study.search.parameter)
-        except ValueError:  # a scene of another kind
+            is_tried = at in self._points and self._grid.index(value) in self._indices
+        except ValueError:  # a scene of another kind, or a value that is not on the grid
             return None
-        return (at, value) if at in self._searches and value in self._values else None
+        return (at, value) if is_tried else None
 
-    def _by_usefulness(self) -> Iterator[_AnyPointSearch]:
-        """Give all searches and certifications, the one whose next task is the most useful first."""
-        # Sorting is stable: among equally busy searches the order of the sweep holds.
-        searches = sorted(self._searches.values(), key=lambda search: len(search.pending))
-        yield from (search for search in searches if not search.pending)
-        yield from self._certifying()
-        yield from (search for search in searches if search.pending)
-        # Known answers may have ended a search on the way here.
-        yield from self._certifying()
+    def _look_at(self, at: float, again: bool = True) -> None:
+        """Take note of what has become of a point, and enter it in the queue again."""
+        point = self._points[at]
+        self._documents.pop(at, None)
+        (self._open.discard if point.done else self._open.add)(at)
+        if unneeded := point.unneeded_tasks():
+            self._unneeded[at] = unneeded
+        else:
+            self._unneeded.pop(at, None)
+        self._note_bracket(at)
+        self._entries[at] += 1
+        if again and at in self._open:
+            heappush(self._queue, (point.urgency, self._order[at], self._entries[at], at))
 
-    def _next_of(self, point_search: _AnyPointSearch) -> SearchRun | None:
-        if isinstance(point_search.search, CriticalValueSearch) and point_search.is_new:
-            guess = expected_bracket(self._study, point_search.sweep_value, self._converged())
-            if guess is not None:
-                point_search.search.replace_guess(guess)
-        return point_search.next_task()
-
-    def _point_searches(self) -> Iterator[_AnyPointSearch]:
-        yield from self._searches.values()
-        yield from self._certifying()
-
-    def _point_search_of(self, task: SearchRun) -> _AnyPointSearch:
-        certification = self._certifications.get(task.sweep_value)
-        if certification is not None and task in certification.pending.values():
-            return certification
-        return self._searches[task.sweep_value]
-
-    def _certifying(self) -> list[PointSearch[Certification]]:
-        every = map(self._certification, self._searches)
-        return [certification for certification in every if certification is not None]
-
-    def _certification(self, at: float) -> PointSearch[Certification] | None:
-        """Return the certification of a search that has converged, beginning it if it is new."""
-        bracket = self._converged_bracket(at) if self._study.search.certify else None
+    def _note_bracket(self, at: float) -> None:
+        bracket = self._points[at].converged_bracket
         if bracket is None:
-            return None
-        if at not in self._certifications:
-            self._certifications[at] = PointSearch(
-                certification_of(self._study, bracket),
-                at,
-                lambda value: certifying_scene(self._study.scene_at(at, value)),
-                partial(side_of, self._study),
-                self._known,
-            )
-            self._certifications[at].take_all_known()
-        return self._certifications[at]
+            if self._converged.pop(at, None) is not None:
+                self._converged_at.remove(at)
+        else:
+            if at not in self._converged:
+                insort(self._converged_at, at)
+            self._converged[at] = bracket
 
-    def _converged(self) -> dict[float, tuple[float, float]]:
-        brackets = {at: self._converged_bracket(at) for at in self._searches}
-        return {at: bracket for at, bracket in brackets.items() if bracket is not None}
-
-    def _converged_bracket(self, at: float) -> tuple[float, float] | None:
-        search = self._searches[at].search
-        low, high = search.bracket if search.status is SearchStatus.CONVERGED else (None, None)
-        return None if low is None or high is None else (low, high)
-
-    def _halvings(self, at: float) -> float:
-        limits = self._study.search.limits
-        bracket = self._searches[at].search.bracket
-        low, high = (end or limit for end, limit in zip(bracket, limits, strict=True))
-        return max(1.0, math.log2(math.log(high / low) / math.log1p(self._study.search.tolerance)))
-
-    def _point(self, at: float) -> BoundaryPoint:
-        search, certification = self._searches[at], self._certification(at)
-        bracket, status, runs = search.search.bracket, str(search.search.status), search.runs
-        outcomes, certified_by = search.outcomes(bracket), None
-        if certification is not None:
-            result, ends = certification.search.result, certification.search.bracket
-            status, runs = str(result), runs + certification.runs
-            if ends is not None:
-                bracket, outcomes = ends, certification.outcomes(ends)
-                if result is CertificationResult.CONVERGED:
-                    certified_by = certifying_scene(self._study.scene_at(at, ends[0])).numerics
-        return BoundaryPoint(
-            parameters={self._study.sweep.parameter: at},
-            bracket=bracket,
-            outcomes=outcomes,
-            status=status,
-            certified=certified_by is not None,
-            certified_by=certified_by,
-            runs=runs,
-        )
+    def _expected_bracket(self, at: float) -> tuple[float, float] | None:
+        place = bisect_left(self._converged_at, at)
+        neighbors = self._converged_at[max(0, place - _NEIGHBORS) : place + _NEIGHBORS]
+        return expected_bracket(self._study, at, {near: self._converged[near] for near in neighbors})

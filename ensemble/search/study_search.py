@@ -8,12 +8,15 @@ from collections.abc import Mapping
 from ensemble.config.study import Study
 from ensemble.search.certification import Certification
 from ensemble.search.critical_value import CriticalValueSearch, Side
+from ensemble.search.scanning_search import ScanningSearch
 from solver.analysis.run import Outcome
 
 # A guess extends beyond the line through known neighbors by this share of the line's change from the nearest
 # of them, because the boundary is curved, and by this many tolerances, because their brackets have a width.
 CURVATURE_MARGIN = 0.1
 BRACKET_MARGIN = 2.0
+
+BracketSearch = CriticalValueSearch | ScanningSearch
 
 
 def side_of(study: Study, outcome: Outcome) -> Side:
@@ -38,7 +41,7 @@ def side_of(study: Study, outcome: Outcome) -> Side:
     return Side.FAILED if outcome is Outcome.FAILED else Side.UNDECIDED
 
 
-def critical_value_search(study: Study, guess: tuple[float, float] | None = None) -> CriticalValueSearch:
+def critical_value_search(study: Study, guess: tuple[float, float] | None = None) -> BracketSearch:
     """Return a new search for one point of a study's boundary.
 
     Parameters
@@ -50,9 +53,13 @@ def critical_value_search(study: Study, guess: tuple[float, float] | None = None
 
     Returns
     -------
-    CriticalValueSearch
+    ScanningSearch or CriticalValueSearch
+        The latter if the study does not scan.
     """
-    return CriticalValueSearch(study.search.grid, study.search.limits, guess)
+    search = study.search
+    if search.scan:
+        return ScanningSearch(search.grid, search.limits, search.scan, guess)
+    return CriticalValueSearch(search.grid, search.limits, guess)
 
 
 def certification_of(study: Study, bracket: tuple[float, float]) -> Certification:

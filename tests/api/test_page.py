@@ -137,7 +137,7 @@ def across(page: Page) -> float:
 
 def test_a_submitted_study_is_shown_while_its_brackets_close(page: Page, url: str) -> None:
     page.goto(f"{url}/#/new?preset=critical-hamaker")
-    expect(page.get_by_text("At most 66 runs")).to_be_visible()
+    expect(page.get_by_text("At most 90 runs")).to_be_visible()
     page.get_by_label("points on each vesicle").fill("31")
     expect(page.get_by_role("alert")).to_contain_text("scene.numerics.points: 31")
     expect(page.get_by_label("points on each vesicle")).to_have_attribute("aria-invalid", "true")

@@ -102,6 +102,7 @@ def _critical_bracket(runs: TimedRuns, plan: WorkPrecisionPlan, tolerance: float
         [
             f"sweep.values=[{SHEAR_RATE}]",
             f"search.tolerance={plan.bracket!r}",
+            "search.scan=0",
             f"scene.numerics.tolerance={tolerance!r}",
         ],
     )

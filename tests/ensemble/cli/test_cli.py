@@ -50,6 +50,8 @@ POINT_FIELDS = {
     "bracket",
     "outcomes",
     "status",
+    "changes",
+    "scanned",
     "certified",
     "certified_by",
     "runs",
@@ -236,7 +238,7 @@ def test_run_loads_no_library_it_does_not_need(ensemble):
 
 def test_bisect_prints_the_documented_fields(finished_study):
     document = finished_study.document
-    assert document.keys() == {"study", "boundary", "wall_seconds", "busy_fraction", "store"}
+    assert document.keys() == {"study", "boundary", "criteria", "wall_seconds", "busy_fraction", "store"}
     assert document["study"] == "critical-hamaker"
     assert Path(document["store"]) == finished_study.store
     assert [point["parameters"] for point in document["boundary"]] == [

@@ -153,6 +153,11 @@ def test_files_are_read_as_presets_are(tmp_path: Path) -> None:
     assert load_scene(str(scene)) == Scene.model_validate({"horizon": 5.0, "vesicles": [{}]})
 
 
+def test_what_is_certified_has_been_scanned() -> None:
+    with pytest.raises(ValueError, match=r"search\.certify: True — needs search\.scan of at least 1"):
+        load_study("critical-hamaker", ["search.certify=true", "search.scan=0"])
+
+
 def test_a_mistyped_preset_is_told_the_nearest_one_and_an_unknown_name_all() -> None:
     with pytest.raises(ValueError, match=r"'critical-hamker' is neither.*did you mean 'critical-hamaker'"):
         load_study("critical-hamker")
@@ -172,6 +177,7 @@ def test_a_file_that_is_not_toml_is_named(tmp_path: Path) -> None:
     ("change", "message"),
     [
         ("search.tolerance=0.6", "search.tolerance: 0.6 — input should be less than or equal to 0.5"),
+        ("search.scan=101", "search.scan: 101 — input should be less than or equal to 100"),
         ("search.limits=[5.0, 0.05]", "search.limits: [5.0, 0.05] — the first must be less than the second"),
         ("search.limits=[1.001, 1.002]", "search.limits: [1.001, 1.002] — must be further apart than"),
         ("search.limits=[0.0, 1.0]", "search.limits.0: 0.0 — input should be greater than 0"),

@@ -84,6 +84,22 @@ def test_bars_span_the_brackets_and_open_brackets_have_none() -> None:
     np.testing.assert_allclose(artist(axes, "bracket").get_segments(), expected, rtol=1e-14)
 
 
+def test_every_other_change_of_the_outcome_has_a_bar() -> None:
+    changes = [
+        {"bracket": bracket, "outcomes": outcomes}
+        for bracket, outcomes in [
+            ((0.10, 0.11), ("separated", "bound")),
+            ((0.20, 0.21), ("bound", "separated")),
+            ((0.34, 0.36), ("separated", "bound")),
+        ]
+    ]
+    answer = point(0.5, 0.35, bracket=(0.34, 0.36), status="non-monotone", changes=changes)
+    figure = phase_diagram(boundary([answer, point(1.0, 0.7)]), [])
+    bars = artist(figure.axes[0], "other change").get_segments()
+    np.testing.assert_allclose(bars, [[(0.5, 0.10), (0.5, 0.11)], [(0.5, 0.20), (0.5, 0.21)]], rtol=1e-14)
+    assert "another change of the outcome" in [text.get_text() for text in figure.legends[0].get_texts()]
+
+
 def test_critical_values_are_joined_in_the_order_of_the_sweep() -> None:
     axes = phase_diagram(boundary([point(1.0, 0.7), point(0.25, 0.2), point(0.5, 0.36)]), []).axes[0]
     line = artist(axes, "boundary")

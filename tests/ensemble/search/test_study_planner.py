@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from ensemble.config.documents import load_study
 from ensemble.config.study import Study
+from ensemble.display.result_tables import boundary_cells, boundary_columns
 from ensemble.search.point_search import SearchRun
 from ensemble.search.study_planner import StudyPlanner
 from solver.analysis.run import Outcome
@@ -168,9 +169,64 @@ def test_failed_and_contradictory_runs_are_reported_not_averaged(study: Study) -
     assert all(point.status in ("non-monotone", "unbracketed") for point in contrary.boundary().points)
 
 
+def test_windows_are_found_listed_and_shown() -> None:
+    one_point = load_study("critical-hamaker", ["sweep.values=[0.5]", "search.scan=4"])
+    edges = (0.1, 0.25, 0.3635)
+
+    def alternating(task: SearchRun) -> Outcome:
+        return Outcome.BOUND if sum(task.value > edge for edge in edges) % 2 else Outcome.SEPARATED
+
+    planner = StudyPlanner(one_point, unknown)
+    run_study(planner, 2, lambda out: out - 1, answer=alternating)
+    (point,) = planner.boundary().points
+    assert point.status == "non-monotone"
+    assert [change.outcomes for change in point.changes] == [
+        ("separated", "bound"),
+        ("bound", "separated"),
+        ("separated", "bound"),
+    ]
+    for change, edge in zip(point.changes, edges, strict=True):
+        assert change.bracket[0] <= edge < change.bracket[1] < change.bracket[0] * 1.01
+    assert point.bracket == point.changes[-1].bracket
+    assert point.other_changes == point.changes[:-1]
+    assert point.scanned is not None
+    assert point.scanned.values == len(point.scanned.looked_at)
+    assert 1 < point.scanned.widest_unseen < 10**0.25 * 1.01
+    columns = boundary_columns([point])
+    cells = dict(zip(columns, boundary_cells(point, columns), strict=True))
+    assert cells["other changes"].count("bound | separated") == 1
+    assert cells["scanned"].startswith(f"{point.scanned.values} values")
+
+
+def test_without_a_scan_a_search_ends_with_the_change_that_it_finds(study: Study) -> None:
+    plain = load_study("critical-hamaker", ["sweep.values=[0.5]", "search.scan=0"])
+    scanning = load_study("critical-hamaker", ["sweep.values=[0.5]"])
+    planners = [StudyPlanner(study, unknown) for study in (plain, scanning)]
+    runs = [len(run_study(planner, 1, lambda out: 0)) for planner in planners]
+    points = [planner.boundary().points[0] for planner in planners]
+    assert points[0].bracket == points[1].bracket
+    assert (points[0].scanned, len(points[0].changes)) == (None, 1)
+    assert runs[0] < runs[1]
+
+
+@pytest.mark.parametrize("scan", [0, 2])
+def test_the_finest_tolerance_begins_at_once_and_takes_what_is_known(scan: int) -> None:
+    finest = load_study(
+        "critical-hamaker", ["sweep.values=[0.5]", "search.tolerance=1e-9", f"search.scan={scan}"]
+    )
+    other = finest.scene_at(0.5, 0.12345)  # not on the grid
+    planner = StudyPlanner(finest, unknown, [other])
+    run_study(planner, 1, lambda out: 0)
+    (point,) = planner.boundary().points
+    low, high = point.bracket
+    assert low is not None
+    assert high is not None
+    assert low <= critical(0.5) < high < low * (1 + 1e-9)
+
+
 def test_finished_searches_tell_the_later_ones_where_to_begin() -> None:
     rates = [0.25, 0.5, 0.75, 1.0, 1.25, 1.5]
-    unguided = ["search.guesses=[]", "search.tolerance=0.01"]
+    unguided = ["search.guesses=[]", "search.tolerance=0.01", "search.scan=0"]
     whole = load_study("critical-hamaker", unguided)
     assert list(whole.sweep.values) == rates
     together = len(run_study(StudyPlanner(whole, unknown), 1, lambda out: 0))

@@ -13,7 +13,7 @@ from ensemble.search.critical_value import SearchStatus, Side
 from ensemble.search.study_search import critical_value_search, expected_bracket, side_of
 from solver.analysis.run import Outcome
 
-HAMAKER = load_study("critical-hamaker")
+HAMAKER = load_study("critical-hamaker", ["search.scan=0"])
 GRID = HAMAKER.search.grid
 
 
