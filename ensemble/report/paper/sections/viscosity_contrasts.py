@@ -85,8 +85,8 @@ _TEXT = (
     "around a steady shape but tumbles.  The theory of Keller and Skalak, here in two dimensions, assumes an "
     "ellipse with a linear velocity on it.  A shape that bending and flow determine, with a velocity that "
     "stretches the membrane nowhere, treads up to somewhat larger contrasts.  A doublet of more viscous "
-    "vesicles needs a little less adhesion, up to a contrast of 4; at 8 outcomes against H are not monotone, "
-    "so that no single critical value exists."
+    "vesicles needs a little less adhesion, up to a contrast of 4; at 8 a pair may come round many times "
+    "before it separates, so that one turn proves nothing."
 )
 _CAPTION = (
     "Left: contrast beyond which a vesicle tumbles, shear rate 1; gray: Keller and Skalak's theory.  Right: "
