@@ -124,7 +124,8 @@ def _http_error(request: Request, error: Exception) -> Response:
     headers = dict(error.headers or {})
     if status is HTTPStatus.METHOD_NOT_ALLOWED:
         # The framework names the methods of the first route at this path; there may be several.
-        described = request.app.openapi()["paths"].get(request.scope["route"].path, {})
+        path = getattr(request.scope.get("route"), "path", None)  # the description itself has no route
+        described = request.app.openapi()["paths"].get(path, {})
         headers["Allow"] = ", ".join(sorted(described)).upper() or headers["Allow"]
     return _response(Problem(status, error.detail, headers))
 

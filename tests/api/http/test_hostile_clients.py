@@ -403,6 +403,14 @@ def test_every_answer_has_the_security_headers_and_other_sites_may_not_read_it(r
     assert "server" not in response.headers
 
 
+@pytest.mark.parametrize("method", ["POST", "DELETE", "OPTIONS", "TRACE"])
+@pytest.mark.parametrize("path", ["/", "/openapi.json", "/healthz", "/assets/main.js"])
+def test_other_methods_are_refused_with_those_that_are_allowed(reading, method, path):
+    answer = reading.request(method, path)
+    assert_refused(answer, 405)
+    assert "GET" in answer.headers["allow"]
+
+
 def test_preflight_requests_of_other_sites_are_refused(reading):
     response = reading.options(
         "/jobs",
