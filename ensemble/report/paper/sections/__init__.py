@@ -14,6 +14,7 @@ from ensemble.report.paper.sections import (
     extensional_pairs,
     potential_exponents,
     sheared_doublets,
+    steady_limits,
     trapped_doublets,
     unequal_vesicles,
     viscosity_contrasts,
@@ -30,6 +31,7 @@ SECTIONS: Final[tuple[Section, ...]] = (
     potential_exponents.SECTION,
     unequal_vesicles.SECTION,
     viscosity_contrasts.SECTION,
+    steady_limits.SECTION,
 )
 
 
