@@ -9,7 +9,7 @@ from rich.markup import escape
 from rich.table import Column, Table
 
 if TYPE_CHECKING:
-    from ensemble.search.branch import BranchPointRecord, BranchSummary
+    from ensemble.search.branch_summary import BranchPointRecord, BranchSummary
 
 _ABSENT = "–"
 

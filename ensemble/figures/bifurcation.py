@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from ensemble.figures.style import BLACK, MARKS, STYLE, VERMILLION, WIDTH
 from ensemble.figures.symbols import describe, quantity
-from ensemble.search.branch import BranchPointRecord, BranchSummary
+from ensemble.search.branch_summary import BranchPointRecord, BranchSummary
 from solver.analysis.run import Outcome
 
 Measured = Callable[[BranchPointRecord], float]

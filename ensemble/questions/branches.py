@@ -22,7 +22,7 @@ from solver.scene import LARGEST_DENSE, Scene
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from ensemble.search.branch import BranchSummary
+    from ensemble.search.branch_summary import BranchSummary
     from ensemble.store import Store
     from solver.analysis.run import Run
     from solver.simulation.steady_scenes import Shapes
@@ -93,7 +93,7 @@ class BranchQuestion:
         -------
         Answer
         """
-        from ensemble.search.branch import branch_key
+        from ensemble.search.branch_summary import branch_key
         from ensemble.store.branch_record import summary_of
         from solver.simulation.resolution import with_points
         from solver.simulation.steady_scenes import follow_steady_states
@@ -141,7 +141,7 @@ def steady_answer(scene: Scene, path: Path | None) -> Answer:
     ValueError
         If steady states of such a scene are not computed.
     """
-    from ensemble.search.branch import SteadyRecord
+    from ensemble.search.branch_summary import SteadyRecord
     from solver.simulation.resolution import with_points
     from solver.simulation.steady_scenes import find_steady_state
     from solver.steady_states.newton import NoSteadyStateError

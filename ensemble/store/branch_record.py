@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ensemble.search.branch import BranchPointRecord, BranchSummary, branch_key
+from ensemble.search.branch_summary import BranchPointRecord, BranchSummary, branch_key
 from ensemble.store.run_record import RESULT_PACKAGES, NamedArray
 from ensemble.timestamp import now
 from solver.revision import RESULTS_REVISION

@@ -18,7 +18,7 @@ from zarr.storage import LocalStore
 
 from ensemble.disk import flush, flush_tree, locked
 from ensemble.errors import StoreError
-from ensemble.search.branch import BranchSummary, branch_key
+from ensemble.search.branch_summary import BranchSummary, branch_key
 from ensemble.store.archive import write_array
 from ensemble.store.branch_record import branch_arrays
 from ensemble.store.run_record import first_problem

@@ -32,7 +32,7 @@ from ensemble.store.staging import STAGING, STORE_LOCK, RunStaging, Staged
 from solver.analysis.run import Outcome, Run
 
 if TYPE_CHECKING:
-    from ensemble.search.branch import BranchSummary
+    from ensemble.search.branch_summary import BranchSummary
     from ensemble.store.archive import StoredArrays
     from ensemble.store.branch_shelf import BranchShelf
     from solver.simulation.steady_scenes import SteadyBranch

@@ -34,7 +34,7 @@ from solver.steady_states.continuation import Limits, OutsideParameterError
 from solver.steady_states.newton import NoSteadyStateError
 
 if TYPE_CHECKING:
-    from ensemble.search.branch import BranchSummary
+    from ensemble.search.branch_summary import BranchSummary
 
 _RATE, _AREA, _CONTRAST = "flow.rate", "vesicles.reduced_area", "vesicles.viscosity_contrast"
 _TRAP_AREAS = (0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95)
