@@ -36,6 +36,7 @@ COMMON_PROBLEMS = problems.documented(
     HTTPStatus.MISDIRECTED_REQUEST,
     HTTPStatus.UNPROCESSABLE_ENTITY,
     HTTPStatus.TOO_MANY_REQUESTS,
+    HTTPStatus.SERVICE_UNAVAILABLE,
 )
 
 # Routes read submissions and write problems without FastAPI's help. Runs may hold numbers that are not

@@ -8,9 +8,13 @@ import os
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
+from hashlib import sha256
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from socket import gethostname
+from tempfile import TemporaryDirectory, TemporaryFile
 from uuid import uuid4
+
+PROBE_BYTES = 1 << 17
 
 # What file systems answer that do not flush directories (some network and user-space ones): their entries
 # are then as durable as the file system makes them.
@@ -49,6 +53,23 @@ def flush_tree(root: Path) -> None:
         flush(Path(directory))
 
 
+def require_space(directory: Path) -> None:
+    """Raise an error unless a directory takes a file of the size that a short run needs.
+
+    Parameters
+    ----------
+    directory : Path
+        It holds no more than before when this returns.
+
+    Raises
+    ------
+    OSError
+        If the disk or the user's part of it is full, or the directory cannot be written to.
+    """
+    with TemporaryFile(dir=directory) as file:
+        file.write(bytes(PROBE_BYTES))
+
+
 @contextmanager
 def locked(path: Path) -> Iterator[None]:
     """Hold an exclusive lock against other threads and processes; it ends when its holder dies.
@@ -83,7 +104,7 @@ def replacing(path: Path) -> Iterator[Path]:
     ------
     Path
         A hidden file with the same suffix, for a file in the same directory.  A killed process leaves it
-        behind.
+        behind, and whoever writes to ``path`` next removes it.
 
     Raises
     ------
@@ -100,9 +121,27 @@ def replacing(path: Path) -> Iterator[Path]:
             with unfinished.open("rb") as source, target.open("wb") as sink:
                 shutil.copyfileobj(source, sink)
         return
-    unfinished = target.with_name(f".{uuid4().hex}{path.suffix}")
+    mine = f".unfinished-{_digest(target.name)}-{_digest(gethostname())}-"
+    for left in target.parent.glob(f"{mine}*"):
+        if not _is_alive(left.name.removeprefix(mine).partition("-")[0]):
+            left.unlink(missing_ok=True)
+    unfinished = target.with_name(f"{mine}{os.getpid()}-{uuid4().hex[:8]}{path.suffix}")
     try:
         yield unfinished
         unfinished.replace(target)
     finally:
         unfinished.unlink(missing_ok=True)
+
+
+def _digest(name: str) -> str:
+    return sha256(os.fsencode(name)).hexdigest()[:8]
+
+
+def _is_alive(process: str) -> bool:
+    try:
+        os.kill(int(process), 0)
+    except (ValueError, PermissionError):  # not a name that `replacing` gives, or of somebody else
+        return True
+    except ProcessLookupError:
+        return False
+    return True

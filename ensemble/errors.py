@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Iterator
 from contextlib import contextmanager
+
+# What is answered where a disk, a quota or the largest size of a file is reached.
+FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 
 
 class EnsembleError(Exception):
@@ -49,8 +53,35 @@ class Interrupted(BaseException):
 
 @contextmanager
 def refusing() -> Iterator[None]:
-    """Turn errors about unusable input (`ValueError`, `OSError`) into `BadInput`."""
+    """Turn errors about unusable input (`ValueError`, `OSError`) into `BadInput`.
+
+    A disk that is full is no matter of the input.
+    """
     try:
         yield
     except (ValueError, OSError) as error:
+        if getattr(error, "errno", None) in FULL:
+            raise
         raise BadInput(str(error)) from error
+
+
+def told_in_a_line(error: BaseException) -> str | None:
+    """Say in one line what is wrong with the machine, the store or its database.
+
+    Parameters
+    ----------
+    error : exception
+        That ended a command.
+
+    Returns
+    -------
+    str or None
+        None for any other error, which is one of this package and shown in full.
+    """
+    from sqlalchemy.exc import DBAPIError
+
+    if isinstance(error, DBAPIError):
+        return f"the database cannot be used ({str(error.orig).splitlines()[0]})"
+    if isinstance(error, EnsembleError | OSError):
+        return " ".join(str(error).split())  # HDF5 breaks its lines
+    return None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 import subprocess
 import tempfile
 import time
@@ -19,13 +20,34 @@ ROOT = 0
 SECONDS_TO_START = 120
 
 
-@dataclass(frozen=True)
+@dataclass
 class Server:
-    """A running server, reached by a socket in its directory.  It refuses to run as root."""
+    """A server, reached by a socket in its directory.  It refuses to run as root."""
 
     programs: Path
     directory: Path
     user: str | None
+    process: subprocess.Popen[bytes] | None = None
+
+    def start(self) -> None:
+        """Start it, and return when it answers."""
+        self.process = subprocess.Popen(
+            [self.programs / "postgres", "-D", self.data, "-k", self.directory, "-c", "listen_addresses="],
+            user=self.user,
+            cwd=self.directory,
+            stderr=subprocess.DEVNULL,
+        )
+        _wait_until_ready(self, self.process)
+
+    def stop(self) -> None:
+        """Stop it, whoever is connected."""
+        if self.process is not None:
+            self.process.send_signal(signal.SIGINT)
+            self.process.wait()
+
+    @property
+    def data(self) -> Path:
+        return self.directory / "data"
 
     def run(self, program: str, *arguments: str) -> None:
         subprocess.run(
@@ -60,20 +82,12 @@ def running(programs: Path) -> Iterator[Server]:
         if user is not None:
             shutil.chown(directory, user)
         server = Server(programs, directory, user)
-        data = str(directory / "data")
-        server.run("initdb", "--pgdata", data, "--username=tests", "--auth=trust")
-        process = subprocess.Popen(
-            [programs / "postgres", "-D", data, "-k", directory, "-c", "listen_addresses="],
-            user=user,
-            cwd=directory,
-            stderr=subprocess.DEVNULL,
-        )
+        server.run("initdb", "--pgdata", str(server.data), "--username=tests", "--auth=trust")
         try:
-            _wait_until_ready(server, process)
+            server.start()
             yield server
         finally:
-            process.terminate()
-            process.wait()
+            server.stop()
     finally:
         shutil.rmtree(directory)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 from collections.abc import Iterable, Mapping, Sequence
 from http import HTTPStatus
 from typing import Any
@@ -11,14 +12,19 @@ from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from pydantic import BaseModel, ConfigDict
 from pydantic_core import ErrorDetails
+from sqlalchemy.exc import OperationalError
 from starlette.exceptions import HTTPException
 
 from ensemble.config.validation import describe
-from ensemble.errors import BadInput
+from ensemble.errors import BadInput, StoreError
+from ensemble.store.sql_database import reason
 
 MEDIA_TYPE = "application/problem+json"
 MAXIMUM_FIELDS = 10  # invalid fields that one answer names
 LONGEST_DETAIL = 2000  # characters
+RETRY_SECONDS = 10  # after which a client may ask again where the database did not answer
+
+_log = logging.getLogger("uvicorn.error")
 
 
 class ProblemDocument(BaseModel):
@@ -92,6 +98,8 @@ def install_handlers(app: FastAPI, missing: Iterable[type[Exception]]) -> None:
     app.add_exception_handler(HTTPException, _http_error)
     app.add_exception_handler(RequestValidationError, _validation_error)
     app.add_exception_handler(BadInput, _bad_input)
+    app.add_exception_handler(StoreError, _damage)
+    app.add_exception_handler(OperationalError, _no_database)
     for error in missing:
         app.add_exception_handler(error, _missing_resource)
     app.add_exception_handler(Exception, _server_error)
@@ -139,6 +147,23 @@ def _validation_error(_: Request, error: Exception) -> Response:
 
 def _bad_input(_: Request, error: Exception) -> Response:
     return _response(Problem(HTTPStatus.UNPROCESSABLE_ENTITY, str(error)))
+
+
+def _damage(request: Request, error: Exception) -> Response:
+    # The paths that the error may name are for the log only.
+    _log.error("%s: %s", request.url.path, error)
+    detail = (
+        "what is stored is damaged; `ensemble check --repair` sets it aside, so that it can be made again"
+    )
+    return _response(Problem(HTTPStatus.CONFLICT, detail))
+
+
+def _no_database(request: Request, error: Exception) -> Response:
+    assert isinstance(error, OperationalError)
+    _log.error("%s: %s", request.url.path, reason(error))
+    cause = "its disk is full" if "full" in reason(error) else "it does not answer or cannot be written to"
+    detail = f"the database cannot be used at the moment: {cause}"
+    return _response(Problem(HTTPStatus.SERVICE_UNAVAILABLE, detail, {"Retry-After": str(RETRY_SECONDS)}))
 
 
 def _missing_resource(request: Request, _: Exception) -> Response:

@@ -131,7 +131,9 @@ async def submit_job(
         checked.question, submitter.user, ranks, seconds, idempotency_key, service.settings.maximum_jobs
     )
     # Awaited through `wait`: if the client disconnects, the transaction, which other jobs share, goes on.
-    await asyncio.wait([asyncio.wrap_future(pending.accepted)])
+    accepted = asyncio.wrap_future(pending.accepted)
+    await asyncio.wait([accepted])
+    accepted.result()
     try:
         result = await service.look_up(service.jobs.result, pending)
     except TooManyJobs as error:

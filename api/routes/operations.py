@@ -19,6 +19,7 @@ from api.http.problems import Problem, documented
 from api.jobs.job import JobStatus
 from api.jobs.job_queue import Jobs
 from api.routes.service import Reader, service_of
+from ensemble.disk import require_space
 
 COUNT_SECONDS = 5.0  # for which the numbers of jobs are kept: to count a million of them takes 0.1 s
 
@@ -74,7 +75,7 @@ async def check_alive() -> Health:
 
 @health_router.get("/readyz", responses=documented(HTTPStatus.SERVICE_UNAVAILABLE))
 def check_ready(request: Request) -> Health:
-    """Answer with 200 if the store and the database of jobs can be read, else with 503.
+    """Answer with 200 if the store and the database of jobs can be read and written to, else with 503.
 
     Parameters
     ----------
@@ -87,14 +88,18 @@ def check_ready(request: Request) -> Health:
     Raises
     ------
     Problem
-        If either cannot be read.
+        If either cannot be read, or the disk is full.
     """
     service = service_of(request)
     try:
         service.jobs.records.page(limit=1)
         service.store.boundaries_page(limit=1)
+        require_space(service.store.path)
     except SQLAlchemyError as error:
         raise Problem(HTTPStatus.SERVICE_UNAVAILABLE, "the store or the database cannot be read") from error
+    except OSError as error:
+        detail = f"the store cannot be written to ({error.strerror})"
+        raise Problem(HTTPStatus.SERVICE_UNAVAILABLE, detail) from error
     return Health(status="ready")
 
 

@@ -26,7 +26,9 @@ RunKey = Annotated[str, Path(pattern="^[0-9a-f]{32}$", description="Key of the r
 Start = Annotated[int, Query(ge=0, le=MAXIMUM_NUMBER, description="Number of the first one.")]
 Stop = Annotated[int, Query(ge=0, le=MAXIMUM_NUMBER, description="Number of the one after the last.")]
 Stride = Annotated[int, Query(ge=1, le=MAXIMUM_NUMBER, description="Step from one to the next.")]
-RUN_RESPONSES: dict[int | str, dict[str, Any]] = NOT_MODIFIED | documented(HTTPStatus.NOT_FOUND)
+RUN_RESPONSES: dict[int | str, dict[str, Any]] = NOT_MODIFIED | documented(
+    HTTPStatus.NOT_FOUND, HTTPStatus.CONFLICT
+)
 FRAMES_RESPONSE: dict[int | str, dict[str, Any]] = {
     HTTPStatus.OK.value: {
         "description": (

@@ -5,7 +5,10 @@ Every command imports what it needs when it is called: no command waits for libr
 
 from __future__ import annotations
 
+import os
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib.metadata import entry_points
 from io import TextIOWrapper
 from typing import Annotated
@@ -20,7 +23,7 @@ from ensemble.cli import (
     steady_commands,
     store_commands,
 )
-from ensemble.errors import BadInput, EnsembleError
+from ensemble.errors import BadInput, told_in_a_line
 from ensemble.mpi.world import only_first_rank_speaks, pin_threads
 
 GROUP = "ensemble.commands"  # of entry points: functions that other distributions add as commands
@@ -62,6 +65,20 @@ def _options(
     pass
 
 
+@contextmanager
+def _flushed_output() -> Iterator[None]:
+    """Raise within the command what the interpreter would print after its end: output that nothing takes."""
+    try:
+        try:
+            yield
+        finally:
+            sys.stdout.flush()
+    except OSError:
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
+        raise
+
+
 def main() -> None:
     """Run the command line.
 
@@ -76,12 +93,16 @@ def main() -> None:
         app.command(command.name)(command.load())
     with only_first_rank_speaks():
         try:
-            app(prog_name="ensemble")
+            with _flushed_output():
+                app(prog_name="ensemble")
         except BadInput as error:
             print(f"ensemble: {error}", file=sys.stderr)
             sys.exit(2)
-        except (EnsembleError, OSError) as error:
-            print(f"ensemble: {error}", file=sys.stderr)
+        except Exception as error:
+            line = told_in_a_line(error)
+            if line is None:
+                raise
+            print(f"ensemble: {line}", file=sys.stderr)
             sys.exit(1)
 
 

@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout
 from typing import TYPE_CHECKING, TypeVar
 
-from ensemble.errors import BadInput, EnsembleError, Interrupted
+from ensemble.errors import BadInput, Interrupted, told_in_a_line
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
@@ -240,9 +240,8 @@ def abort_guard(communicator: Intracomm | None) -> Iterator[None]:
     except BaseException as error:
         if communicator is None:
             raise
-        # What is wrong with the machine or the store is said in a line; anything else is an error of ours.
-        expected = isinstance(error, EnsembleError | OSError)
-        text = f"ensemble: {error}" if expected else traceback.format_exc()
+        line = told_in_a_line(error)
+        text = traceback.format_exc() if line is None else f"ensemble: {line}"
         # The stream of the process: the command line silences sys.stderr on every rank but the first.
         print(text, file=sys.__stderr__, flush=True)
         # The launcher stops forwarding output as soon as it hears of the end.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from io import BytesIO
 from pathlib import Path
 
 import h5netcdf
@@ -62,17 +63,20 @@ def export_run(summary: RunSummary, run: Run, path: Path) -> None:
     OSError
         If the file cannot be written.  An earlier file is then unchanged.
     """
+    # Made in memory: the library cannot close a file of which the disk takes only a part.
+    image = BytesIO()
+    # Attributes beyond 64 KiB (a scene of many vesicles) need the 1.8 file format or later.
+    with h5netcdf.File(image, "w", libver=("v108", "v110")) as file:
+        for name, array in arrays(run).items():
+            for dimension, size in zip(array.dimensions, array.values.shape, strict=True):
+                if dimension not in file.dimensions:
+                    file.dimensions[dimension] = size
+            variable = file.create_variable(name, array.dimensions, data=array.values)
+            if name in _DESCRIPTIONS:
+                variable.attrs["long_name"], variable.attrs["units"] = _DESCRIPTIONS[name]
+        for name, value in summary.document().items():
+            file.attrs[name] = json.dumps(value)
     with replacing(path) as unfinished:
-        # Attributes beyond 64 KiB (a scene of many vesicles) need the 1.8 file format or later.
-        with h5netcdf.File(unfinished, "w", libver=("v108", "v110")) as file:
-            for name, array in arrays(run).items():
-                for dimension, size in zip(array.dimensions, array.values.shape, strict=True):
-                    if dimension not in file.dimensions:
-                        file.dimensions[dimension] = size
-                variable = file.create_variable(name, array.dimensions, data=array.values)
-                if name in _DESCRIPTIONS:
-                    variable.attrs["long_name"], variable.attrs["units"] = _DESCRIPTIONS[name]
-            for name, value in summary.document().items():
-                file.attrs[name] = json.dumps(value)
+        unfinished.write_bytes(image.getbuffer())
         flush(unfinished)
     flush(path.parent)

@@ -16,9 +16,8 @@ from ensemble.disk import flush
 from ensemble.errors import OtherVersionError, StoreError
 from ensemble.store.catalog import Catalog
 from ensemble.store.run_record import RunSummary
-from ensemble.store.staging import STAGING, abandoned, is_own_directory, whole_runs
+from ensemble.store.staging import RUNS, STAGING, abandoned, is_own_directory, whole_runs
 
-RUNS = "runs"
 LOST_AND_FOUND = "lost+found"
 
 

@@ -16,16 +16,22 @@ from collections.abc import Iterator
 from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import mkdtemp
 from uuid import uuid4
 
+from tenacity import Retrying, retry_if_exception_type, stop_after_delay, wait_exponential_jitter
+
 from ensemble.disk import flush, flush_tree, locked
+from ensemble.errors import StoreError
 from ensemble.store.run_record import RunSummary
 from solver.analysis.run import Run
 
+RUNS = "runs"
 STAGING = "staging"
 STORE_LOCK = "store.lock"
 WRITER_LOCK = "writer.lock"
 PARTIAL = ".partial"
+DISK_SECONDS = 60  # for which writing is tried again while the database or the disk does not take it
 
 _NAME = re.compile(r"[0-9a-f]{32}")  # of directories that this module makes
 
@@ -81,15 +87,36 @@ class RunStaging(AbstractContextManager["RunStaging"]):
         -------
         Staged
             What `Store.commit` takes, in this process or another one.
+
+        Raises
+        ------
+        StoreError
+            If the run could not be written for `DISK_SECONDS`.  It is kept in the directory for temporary
+            files, if it can be.
         """
+        summary = RunSummary.of(run) if summary is None else summary
+        try:
+            return patiently(OSError)(self._stage_once, run, summary)
+        except OSError as error:
+            place = _kept_elsewhere(run, summary)
+            kept = "is lost" if place is None else f"is kept in {place}: move it into {self.path / RUNS}"
+            trouble = error.strerror or error
+            raise StoreError(
+                f"run {summary.key}: {self.path} does not take it ({trouble}), and it {kept}"
+            ) from error
+
+    def _stage_once(self, run: Run, summary: RunSummary) -> Staged:
         from ensemble.store.archive import write_run
 
-        summary = RunSummary.of(run) if summary is None else summary
         whole = self.directory() / uuid4().hex
         partial = whole.with_suffix(PARTIAL)
-        write_run(partial, summary, run)
-        flush_tree(partial)
-        partial.rename(whole)
+        try:
+            write_run(partial, summary, run)
+            flush_tree(partial)
+            partial.rename(whole)
+        except OSError:
+            shutil.rmtree(partial, ignore_errors=True)  # its space may be what lacks
+            raise
         flush(self._directory)
         return Staged(whole, summary)
 
@@ -126,6 +153,38 @@ class RunStaging(AbstractContextManager["RunStaging"]):
             descriptor = os.open(self._directory / WRITER_LOCK, os.O_RDWR | os.O_CREAT, 0o666)
             fcntl.flock(descriptor, fcntl.LOCK_EX)
         return descriptor
+
+
+def patiently(*trouble: type[Exception]) -> Retrying:
+    """Return what calls a function again while the disk or the database is in trouble.
+
+    Parameters
+    ----------
+    *trouble : type
+        Exceptions after which it is called again, for `DISK_SECONDS`.
+
+    Returns
+    -------
+    Retrying
+    """
+    return Retrying(
+        retry=retry_if_exception_type(trouble),
+        stop=stop_after_delay(DISK_SECONDS),
+        wait=wait_exponential_jitter(multiplier=0.1, max=5.0),
+        reraise=True,
+    )
+
+
+def _kept_elsewhere(run: Run, summary: RunSummary) -> Path | None:
+    """Write a run to the directory for temporary files, and return where; None if that fails, too."""
+    from ensemble.store.archive import write_run
+
+    try:
+        place = Path(mkdtemp(prefix="ensemble-run-"), summary.key)
+        write_run(place, summary, run)
+    except OSError:
+        return None
+    return place
 
 
 def whole_runs(directory: Path) -> Iterator[Path]:

@@ -19,16 +19,15 @@ from typing import TYPE_CHECKING, Self, TypeVar
 
 from pydantic import ValidationError
 from sqlalchemy.exc import DatabaseError
-from tenacity import Retrying, retry_if_exception_type, stop_after_delay, wait_exponential_jitter
 
-from ensemble.disk import flush, locked
-from ensemble.errors import NotStored, OtherVersionError, StoreError, StoreInputError
+from ensemble.disk import flush, locked, require_space
+from ensemble.errors import FULL, NotStored, OtherVersionError, StoreError, StoreInputError
 from ensemble.search.boundary import Boundary
 from ensemble.store.catalog import Catalog, Record
-from ensemble.store.recovery import RUNS, Recovery
+from ensemble.store.recovery import Recovery
 from ensemble.store.run_record import RunSummary, first_problem
 from ensemble.store.sql_database import CATALOG, PLACE, UNUSABLE, Place, is_file, reason
-from ensemble.store.staging import STAGING, STORE_LOCK, RunStaging, Staged
+from ensemble.store.staging import RUNS, STAGING, STORE_LOCK, RunStaging, Staged, patiently
 from solver.analysis.run import Outcome, Run
 
 if TYPE_CHECKING:
@@ -36,8 +35,6 @@ if TYPE_CHECKING:
     from ensemble.store.archive import StoredArrays
     from ensemble.store.branch_shelf import BranchShelf
     from solver.simulation.steady_scenes import SteadyBranch
-
-COMMIT_SECONDS = 60  # for which a commit is tried again while the database or the disk does not answer
 
 _CANDIDATES = 5  # keys that a message about an ambiguous one names
 
@@ -92,6 +89,7 @@ class Store(AbstractContextManager["Store"]):
         with _refused(path):
             _require_writable(path)
             _require_catalog(path)
+            (path / STAGING).mkdir(exist_ok=True)  # a copy may lack it
             store = cls(path)
             store._catalog.require_writable()
             for line in store.recover():
@@ -153,7 +151,7 @@ class Store(AbstractContextManager["Store"]):
         """Commit a staged run: from then on it exists.
 
         If the key exists already, that run stays and the staged copy is removed.  While the database or the
-        disk does not answer the commit is tried again for `COMMIT_SECONDS`.
+        disk does not answer the commit is tried again for `ensemble.store.staging.DISK_SECONDS`.
 
         Parameters
         ----------
@@ -171,16 +169,9 @@ class Store(AbstractContextManager["Store"]):
             If the run could not be committed.  It stays where it is and the next process that opens the store
             to write adopts it.
         """
-        trouble = (OSError, *UNUSABLE)
-        attempts = Retrying(
-            retry=retry_if_exception_type(trouble),
-            stop=stop_after_delay(COMMIT_SECONDS),
-            wait=wait_exponential_jitter(0.1, 5.0),
-            reraise=True,
-        )
         try:
-            return attempts(self._commit_once, staged)
-        except trouble as error:
+            return patiently(OSError, *UNUSABLE)(self._commit_once, staged)
+        except (OSError, *UNUSABLE) as error:
             raise StoreError(
                 f"run {staged.key}: it could not be committed ({reason(error)}); it is kept in {self.path} "
                 "and the next command that writes there adopts it"
@@ -519,9 +510,24 @@ class Store(AbstractContextManager["Store"]):
         Parameters
         ----------
         boundary : Boundary
+
+        Raises
+        ------
+        StoreError
+            If it could not be written.
         """
-        with locked(self._lock):
-            self._catalog.put_boundary(boundary)
+
+        def put() -> None:
+            with locked(self._lock):
+                self._catalog.put_boundary(boundary)
+
+        try:
+            patiently(OSError, *UNUSABLE)(put)
+        except (OSError, *UNUSABLE) as error:
+            raise StoreError(
+                f"boundary {boundary.name}: it could not be written ({reason(error)}); its runs are kept and "
+                "the same command goes on"
+            ) from error
 
     def boundaries(self, where: Sequence[str] = ()) -> list[Boundary]:
         """Return the boundaries that meet all filters; the latest change last.
@@ -683,6 +689,7 @@ def _require_writable(path: Path) -> None:
     for directory in (path, path / RUNS, path / STAGING):
         if directory.exists() and not os.access(directory, os.W_OK | os.X_OK):
             raise PermissionError(errno.EACCES, f"no permission to write to {directory}")
+    require_space(path)
 
 
 def _require_catalog(path: Path) -> None:
@@ -709,6 +716,8 @@ def _refused(path: Path) -> Iterator[None]:
         yield
     except (OSError, *UNUSABLE) as error:
         text = getattr(error, "strerror", None) or reason(error)
+        if getattr(error, "errno", None) in FULL:  # nothing is wrong with what was asked
+            raise StoreError(f"store: {path} cannot be written to ({text})") from error
         lost = isinstance(error, FileNotFoundError | DatabaseError) and _exists(path)
         hint = (
             f"; `ensemble check --repair --store {path}` rebuilds a lost or damaged catalog" if lost else ""

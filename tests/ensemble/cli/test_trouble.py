@@ -157,6 +157,28 @@ def test_a_damaged_run_is_named_set_aside_and_made_again(ensemble, stored_run, t
     assert ensemble("check", f"--store={store}").returncode == 0
 
 
+LOADED = """
+import sys
+from ensemble.__main__ import main
+try:
+    main()
+except SystemExit as end:
+    assert not end.code
+print(sorted({name.partition(".")[0] for name in sys.modules} & {"numba", "llvmlite", "mpi4py"}))
+"""
+
+
+@pytest.mark.parametrize("name", ["run.png", "run.gif"])
+def test_drawing_a_stored_run_loads_no_compiler(stored_run, tmp_path: Path, name: str) -> None:
+    store, key = stored_run
+    command = ["show", key, f"--output={tmp_path / name}", f"--store={store}"]
+    result = subprocess.run(
+        [sys.executable, "-c", LOADED, *command], capture_output=True, text=True, check=False
+    )
+    assert result.stdout == "[]\n", result.stderr
+    assert (tmp_path / name).stat().st_size > 0
+
+
 def test_stores_are_merged(ensemble, stored_run, finished_study, tmp_path: Path) -> None:
     store, key = stored_run
     target = shutil.copytree(finished_study.store, tmp_path / "store")

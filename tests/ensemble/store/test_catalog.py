@@ -11,11 +11,11 @@ import pytest
 from pydantic import ValidationError
 from sqlalchemy import text
 
-from ensemble.store import Store, StoreInputError
+from ensemble.store import Store, StoreError, StoreInputError, staging
 from ensemble.store.sql_database import PLACE, Place, engine
 from tests import postgresql
 from tests.ensemble.catalog_conformance import CatalogConformance, boundary, made_with
-from tests.ensemble.runs import shear_run
+from tests.ensemble.runs import assert_same_run, shear_run
 
 
 def test_critical_value_is_the_geometric_mean_of_a_closed_bracket() -> None:
@@ -81,3 +81,27 @@ def test_a_database_that_cannot_be_used_makes_no_store(url: str, tmp_path: Path)
     assert "\n" not in str(refused.value)
     with made_with(None, tmp_path / "store") as store:
         assert store.summaries() == []
+
+
+def test_a_server_that_is_away_at_a_commit_costs_no_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    programs = postgresql.programs()
+    if programs is None:
+        pytest.skip("no PostgreSQL server: install the system's package")
+    monkeypatch.setattr(staging, "DISK_SECONDS", 0.5)
+    path = tmp_path / "store"
+    with postgresql.running(programs) as server:
+        with made_with(server.new_database(), path) as store:
+            staged = store.stage(shear_run())
+            server.stop()
+            with pytest.raises(StoreError, match="it is kept in") as refused:
+                store.commit(staged)
+            assert "\n" not in str(refused.value)
+        for opening in (Store.open, Store.existing):
+            with pytest.raises(StoreInputError, match="cannot be opened"):
+                opening(path)
+        server.start()
+        with Store.open(path) as store:
+            assert_same_run(store.load(staged.key), shear_run())
+            assert store.check() == []

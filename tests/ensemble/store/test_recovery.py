@@ -16,8 +16,7 @@ from tempfile import TemporaryDirectory
 
 import pytest
 
-from ensemble.store import Store, StoreError, StoreInputError
-from ensemble.store import store as store_module
+from ensemble.store import Store, StoreError, StoreInputError, staging
 from ensemble.store.merge import merge
 from tests.ensemble.catalog_conformance import NOON, boundary
 from tests.ensemble.runs import assert_same_run, shear_run, shear_scene
@@ -223,7 +222,7 @@ def test_a_run_whose_commit_fails_is_kept_and_adopted(
 ) -> None:
     """The catalog is taken away after the run is made; it comes back later."""
     path = filled(tmp_path / "store")
-    monkeypatch.setattr(store_module, "COMMIT_SECONDS", 0.5)
+    monkeypatch.setattr(staging, "DISK_SECONDS", 0.5)
     with Store.open(path) as store:
         staged = store.stage(numbered_run(0))
         (path / "catalog.sqlite").rename(tmp_path / "away")

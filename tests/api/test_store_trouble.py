@@ -1,0 +1,60 @@
+"""A service whose store is damaged or whose disk is full says so, and goes on afterwards."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+from ensemble.store import Store
+from tests.api.servers import client_of
+from tests.ensemble.runs import shear_run
+from tests.full_disks import ROOM, filled, small_disk
+
+DAMAGES: dict[str, Callable[[Path], object]] = {
+    "missing array": lambda run: shutil.rmtree(run / "tangent_angle"),
+    "truncated chunk": lambda run: (run / "gap" / "c" / "0").write_bytes(b"\x28\xb5"),
+    "missing chunk": lambda run: (run / "center" / "c" / "0" / "0" / "0").unlink(),
+    "missing attributes": lambda run: (run / "zarr.json").write_text('{"zarr_format":3,"node_type":"group"}'),
+    "JSON cut short": lambda run: (run / "zarr.json").write_text('{"zarr_format":3,"no'),
+    "empty directory": lambda run: (shutil.rmtree(run), run.mkdir()),
+    "no directory": lambda run: shutil.rmtree(run),
+}
+
+
+def test_a_damaged_run_is_said_to_be_damaged(store: Path) -> None:
+    with Store.open(store) as opened:
+        key = opened.save(shear_run())
+    run = store / "runs" / key
+    kept = shutil.copytree(run, store.with_name("kept"))
+    with client_of(store) as client:
+        for name, damage in DAMAGES.items():
+            damage(run)
+            for part in ("series", "frames", "flow"):
+                response = client.get(f"/runs/{key}/{part}")
+                assert response.status_code == 409, (name, part)
+                assert response.headers["content-type"] == "application/problem+json"
+                assert "damaged" in response.json()["detail"]
+                assert str(store) not in response.text
+            assert client.get(f"/runs/{key}").status_code == 200
+            shutil.rmtree(run, ignore_errors=True)
+            shutil.copytree(kept, run)
+        assert client.get(f"/runs/{key}/series").status_code == 200
+
+
+def test_a_full_disk_refuses_jobs_for_as_long_as_it_is_full(tmp_path: Path) -> None:
+    with small_disk(tmp_path / "disk", ROOM) as disk:
+        Store.open(disk / "store").close()
+        with client_of(disk / "store") as client:
+            assert client.get("/readyz").status_code == 200
+            with filled(disk):
+                response = client.post("/jobs", json={"preset": "doublet-shear"})
+                assert response.status_code == 503, response.text
+                assert "full" in response.json()["detail"]
+                assert response.headers["retry-after"]
+                response = client.get("/readyz")
+                assert response.status_code == 503
+                assert "No space left on device" in response.json()["detail"]
+                assert client.get("/jobs").json()["items"] == []
+            assert client.get("/readyz").status_code == 200
+            assert client.post("/jobs", json={"preset": "doublet-shear"}).status_code == 202
