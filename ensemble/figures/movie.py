@@ -21,6 +21,7 @@ from matplotlib.quiver import Quiver
 from scipy.interpolate import Akima1DInterpolator
 
 from ensemble.disk import replacing
+from ensemble.errors import EnsembleError
 from ensemble.figures.membranes import (
     FEW,
     add_tension_bar,
@@ -78,7 +79,7 @@ def save_movie(run: Run, path: Path) -> None:
     ------
     ValueError
         If the run has no finite state.
-    OSError
+    EnsembleError
         If the file cannot be written; it says what the encoder said.
     """
     form = _FORMATS[path.suffix.lower()]
@@ -94,7 +95,7 @@ def save_movie(run: Run, path: Path) -> None:
                     writer.grab_frame()
         except CalledProcessError as error:
             words = (error.stderr or b"").decode(errors="replace").strip().splitlines()
-            raise OSError(
+            raise EnsembleError(
                 f"output: ffmpeg could not write {path} ({words[-1] if words else error})"
             ) from error
 
