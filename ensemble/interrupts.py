@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import select
 import signal
@@ -17,6 +18,8 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM)
 UNWINDING_SECONDS = 1.0
 PARENT_CHECK_SECONDS = 0.2
 LAUNCHER_CONNECTION = "PMI_FD"  # number of the open socket to the launcher's helper, where there is one
+HYDRA = "HYDI_CONTROL_FD"  # set by the launcher of MPICH
+PR_SET_PDEATHSIG = 1
 SHOW_CURSOR = "\x1b[?25h"  # a progress display hides it
 
 
@@ -47,11 +50,14 @@ def end_with_launcher() -> None:
 
     An MPI launcher that is killed takes its ranks along, but its helper on each node does not: ranks that
     lost it would simulate on, unrecorded.  A new parent is the sign.  A helper that died before this call is
-    known by the connection that it left.
+    known by the connection that it left.  While MPI starts, no thread of Python can look: then the kernel
+    ends the process.
     """
     if not is_launched():
         return
     parent = os.getppid()
+    if HYDRA in os.environ:  # it never ends the thread that starts ranks, of which the kernel takes note
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
     if _is_cut_off():
         os._exit(1)
 

@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 
 from ensemble.store import Store, StoreError, staging
+from tests.api.stores import example_boundary
 from tests.conftest import ENSEMBLE
 from tests.ensemble.catalog_conformance import NOON, boundary
 from tests.ensemble.runs import assert_same_run, shear_run
@@ -39,7 +40,7 @@ def limited(size: int, *arguments: str) -> subprocess.CompletedProcess[str]:
 def store(tmp_path: Path) -> Path:
     with Store.open(tmp_path / "store") as opened:
         opened.save(RUN)
-        opened.save_boundary(boundary("a", 0.25, 1.0, NOON))
+        opened.save_boundary(example_boundary())
     return tmp_path / "store"
 
 
@@ -167,7 +168,7 @@ def test_a_quota_that_is_used_up_by_a_file(store: Path, tmp_path: Path, name: st
     output = tmp_path / "files" / name
     output.parent.mkdir()
     output.write_text("what was there")
-    key = key_of(store) if name.startswith("run") else "critical"
+    key = key_of(store) if name.startswith("run") else "critical-hamaker"
     command = ["export", key, str(output)] if name.endswith(".h5") else ["show", key, f"--output={output}"]
     result = limited(1 << 10, *command, f"--store={store}")
     assert result.returncode == 1, result.stderr
