@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from io import BytesIO
 from pathlib import Path
 from typing import Final
 
@@ -35,8 +36,11 @@ def save(figure: Figure, path: Path) -> None:
         For any other suffix.
     """
     suffix = suffix_among(path, FIGURE_SUFFIXES)
-    with replacing(path) as unfinished, matplotlib.rc_context(STYLE):
-        figure.savefig(unfinished, metadata=_UNDATED[suffix])
+    image = BytesIO()  # a disk may take only a part, which not every format can end
+    with matplotlib.rc_context(STYLE):
+        figure.savefig(image, format=suffix[1:], metadata=_UNDATED[suffix])
+    with replacing(path) as unfinished:
+        unfinished.write_bytes(image.getbuffer())
 
 
 def suffix_among(path: Path, suffixes: Sequence[str]) -> str:
