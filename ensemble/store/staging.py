@@ -149,7 +149,7 @@ class RunStaging(AbstractContextManager["RunStaging"]):
     def _register(self) -> int:
         # Under the store's lock no recovery meets the directory before its own lock is taken.
         with locked(self.path / STORE_LOCK):
-            self._directory.mkdir(parents=True)
+            self._directory.mkdir(parents=True, exist_ok=True)  # an earlier try may have made it
             descriptor = os.open(self._directory / WRITER_LOCK, os.O_RDWR | os.O_CREAT, 0o666)
             fcntl.flock(descriptor, fcntl.LOCK_EX)
         return descriptor
