@@ -9,6 +9,7 @@ import numpy as np
 
 from solver.flows.imposed_flow import Array, ImposedFlow, Symbol
 from solver.flows.linear import LinearFlow
+from solver.flows.trap import Trap
 
 
 class Extension(LinearFlow):
@@ -24,6 +25,4 @@ class Extension(LinearFlow):
     @property
     def comoving(self) -> ImposedFlow:
         """A trap: what the flow carries away it carries away as a whole."""
-        from solver.flows.trap import Trap
-
         return Trap(rate=self.rate)

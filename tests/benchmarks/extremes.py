@@ -1,4 +1,4 @@
-"""Random scenes from all over the validated ranges: how many are fine, unresolved, or given up, and why.
+"""Random scenes over wide ranges: how many are fine, unresolved, or given up, and why.
 
 ``python -m tests.benchmarks.extremes [--count 200] [--seconds 10]`` runs them one after the other, prints a
 line for each and a table at the end, and exits with 1 if one broke.  What the points do not resolve runs

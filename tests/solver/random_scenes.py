@@ -1,4 +1,4 @@
-"""Scenes drawn at random from all over the validated ranges, and what a run of one must keep to."""
+"""Scenes drawn at random over wide ranges, and what a run of one must keep to."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Random scenes from all over the validated ranges end with an outcome or with a reason, never otherwise."""
+"""Random scenes over wide ranges end with an outcome or with a reason, never otherwise."""
 
 from __future__ import annotations
 
