@@ -248,7 +248,7 @@ def test_only_chunks_that_are_asked_for_are_read(long_run):
                 assert client.get(address).status_code == 200
                 assert client.get(address, headers=BINARY).status_code == 200
             assert client.get(f"/runs/{key}/flow").status_code == 200
-            assert client.get(f"/runs/{key}/frames?start=19999").status_code == 500
+            assert client.get(f"/runs/{key}/frames?start=19999").status_code == 409
     finally:
         chunks[-1].write_bytes(last)
 
@@ -288,7 +288,7 @@ def test_a_lost_chunk_is_an_error_and_not_numbers(long_run):
     chunk.unlink()
     try:
         with client_of(path) as client:
-            assert client.get(f"/runs/{key}/frames?start=19999").status_code == 500
+            assert client.get(f"/runs/{key}/frames?start=19999").status_code == 409
     finally:
         chunk.write_bytes(lost)
 
