@@ -128,8 +128,11 @@ def shared(base: Path, place: Path) -> Iterator[State]:
             os.chown(entry, 0, GROUP)
             entry.chmod(0o2775 if entry.is_dir() else 0o664)
     place.chmod(0o777)
-    environment = os.environ | {"HOME": str(place)}
-    yield State(path, options={"user": OTHER_USER, "group": GROUP, "umask": 0o002, "env": environment})
+    # The interpreter may be where only root looks: this user reads everything and writes only what is shared.
+    become = f"--reuid={OTHER_USER} --regid={GROUP} --clear-groups"
+    reading = "--inh-caps=+dac_read_search --ambient-caps=+dac_read_search"
+    python = ("setpriv", *become.split(), *reading.split(), *ENSEMBLE)
+    yield State(path, python, {"umask": 0o002, "env": os.environ | {"HOME": str(place)}})
 
 
 @contextmanager
