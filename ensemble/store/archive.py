@@ -69,7 +69,7 @@ def write_run(directory: Path, summary: RunSummary, run: Run) -> None:
 def _open(directory: Path) -> zarr.Group:
     try:
         return zarr.open_group(LocalStore(directory, read_only=True), mode="r", zarr_format=3)
-    except (OSError, ValueError, KeyError) as error:
+    except (OSError, ValueError, KeyError, TypeError) as error:
         raise StoreError(f"run {directory.name}: no readable group ({error})") from error
 
 

@@ -287,7 +287,7 @@ def test_the_exit_status_tells_that_a_search_did_not_converge(ensemble, tmp_path
 
 def test_a_run_that_fails_at_its_start_is_an_outcome(ensemble, tmp_path):
     slender = ["--set=vesicles.reduced_area=0.03", f"--store={tmp_path / 'store'}"]
-    result = ensemble("run", "vesicle-shear", *slender, "--no-store", "--json")
+    result = ensemble("run", "vesicle-shear", *slender, "--json")
     assert result.returncode == 1, result.stderr
     document = json.loads(result.stdout, parse_constant=pytest.fail)
     assert set(document) == RUN_FIELDS

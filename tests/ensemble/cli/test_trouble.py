@@ -90,7 +90,7 @@ def test_a_rank_in_another_directory_uses_the_store_of_the_first(launcher, tmp_p
     """The address of the store is relative, and only the first rank is where it leads to it."""
     (tmp_path / "elsewhere").mkdir()
     script = f'[ "$PMI_RANK" = 1 ] && cd {tmp_path}/elsewhere; cd . ; exec "$@"'
-    study = ["bisect", "--set=sweep.values=[0.5]", "--set=scene.numerics.points=32", "--tolerance=0.4"]
+    study = ["bisect", "--set=sweep.values=[0.5]", "--set=scene.numerics.points=32", "--tolerance=0.3"]
     study += ["--set=scene.numerics.tolerance=1e-3", "--store=relative", "--json"]
     result = subprocess.run(
         launcher.command(2, ["sh", "-c", script, "sh", *ENSEMBLE, *study]),

@@ -56,11 +56,11 @@ def test_equal_scenes_have_equal_keys() -> None:
 
 @pytest.mark.parametrize(
     ("path", "value"),
-    # Two belong to other integrators than the document's: below.  There is one kind of adhesion.
+    # Two belong to other integrators than the document's, two are not set, and there is one kind of adhesion.
     [
         (path, value)
         for path, value in leaves(DOCUMENT)
-        if path[-1] not in ("order", "step_control", "cutoff") and path != ("adhesion", "kind")
+        if path[-1] not in ("order", "step_control", "cutoff", "wall_limit") and path != ("adhesion", "kind")
     ],
     ids=lambda part: ".".join(map(str, part)) if isinstance(part, tuple) else None,
 )
@@ -81,6 +81,16 @@ def test_options_of_an_integrator_change_the_key() -> None:
         {"integrator": "sdc", "order": 2, "step_control": "area-length"},
     ]
     assert len({run_key(Scene.model_validate({**DOCUMENT, "numerics": each})) for each in numerics}) == 4
+
+
+def test_limits_that_are_not_set_change_the_key_when_they_are() -> None:
+    adhesion, numerics = DOCUMENT["adhesion"], DOCUMENT["numerics"]
+    documents = [
+        DOCUMENT,
+        {**DOCUMENT, "adhesion": {**adhesion, "cutoff": 2.0}},
+        {**DOCUMENT, "numerics": {**numerics, "wall_limit": 60.0}},
+    ]
+    assert len({run_key(Scene.model_validate(document)) for document in documents}) == 3
 
 
 def test_leaving_a_term_out_changes_the_key() -> None:

@@ -157,7 +157,7 @@ from ensemble.mpi.store_on_ranks import store_on_ranks
 from ensemble.config.documents import load_scene
 
 LONG, SHORT = (
-    load_scene("vesicle-shear", ["numerics.points=32", f"horizon={horizon}", "criteria.steady_time=1e9"])
+    load_scene("vesicle-shear", ["numerics.points=32", f"horizon={horizon}", "criteria.steady_time=1e9", "output.interval=10"])
     for horizon in (1e6, 2.0)
 )
 

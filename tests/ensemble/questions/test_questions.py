@@ -72,8 +72,8 @@ def test_a_run_that_would_record_too_much_is_refused_by_its_interval() -> None:
     time = load_scene("doublet-shear").horizon * load_scene("doublet-shear").criteria.extensions
     least = time / MOST_RECORDS
     assert preset_question("doublet-shear", {"output.interval": 1.01 * least}).cost.runs == 1
-    with pytest.raises(ValueError, match=r"output\.interval: .* — must be at least"):
-        _ = preset_question("doublet-shear", {"output.interval": 0.99 * least}).cost
+    with pytest.raises(ValueError, match=r"output\.interval must be at least"):
+        preset_question("doublet-shear", {"output.interval": 0.99 * least})
     # Also where only one limit of a search makes a run so long.
     changes = {"search.parameter": "horizon", "search.limits": [1.0, 1e4], "search.guesses": []}
     with pytest.raises(ValueError, match=r"output\.interval"):

@@ -30,7 +30,7 @@ from ensemble.store import Store
 TINY = WorkPrecisionPlan(
     methods=(BDF,),
     points=(32,),
-    tolerances=(1e-1, 1e-4),
+    tolerances=(1e-2, 1e-5),
     work_limit=5_000,
     reference=(48, 1e-6),
     control=(40, 1e-6),
