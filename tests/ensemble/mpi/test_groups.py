@@ -156,8 +156,9 @@ from ensemble.mpi.run_study import run_queue
 from ensemble.mpi.store_on_ranks import store_on_ranks
 from ensemble.config.documents import load_scene
 
+COARSE = ("numerics.points=32", "criteria.steady_time=1e9")
 LONG, SHORT = (
-    load_scene("vesicle-shear", ["numerics.points=32", f"horizon={horizon}", "criteria.steady_time=1e9", "output.interval=10"])
+    load_scene("vesicle-shear", [*COARSE, f"horizon={horizon}", f"output.interval={horizon / 1e5}"])
     for horizon in (1e6, 2.0)
 )
 
