@@ -45,7 +45,7 @@ QUICK_STUDY = {
     "values of the shear rate": "0.5",
     "relative width of a bracket": "0.025",
     "points on each vesicle": "36",
-    "tolerance in time": "1e-3",
+    "tolerance in time": "1e-4",
 }
 
 
@@ -152,7 +152,9 @@ def test_a_submitted_study_is_shown_while_its_brackets_close(page: Page, url: st
     drawn: list[list[float]] = []
     page.locator(".diagram .main-svg").first.wait_for(timeout=60_000)
     succeeded = page.locator(".job-status", has_text="succeeded")
+    failed = page.locator(".job-status", has_text="failed")
     while not succeeded.is_visible():
+        assert not failed.is_visible()
         drawn.append(widths(page))
         page.wait_for_timeout(50)
     expect(page.get_by_text("complete", exact=True)).to_be_visible()
