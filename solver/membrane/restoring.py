@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.compilation import compiled
+from solver.membrane.geometry import ROUNDNESS
 from solver.membrane.spectral import highest_modes, integration
 
 if TYPE_CHECKING:
@@ -144,7 +145,8 @@ class Restoring:
         Restoring
         """
         reduced_area = np.array([vesicle.reduced_area for vesicle in vesicles])
-        return cls(reduced_area, shape_rates(vesicles, scene))
+        # No change of shape leads the area of a circle back: it is the largest for its length.
+        return cls(reduced_area, np.where(reduced_area > 1 - ROUNDNESS, 0.0, shape_rates(vesicles, scene)))
 
     def of_vesicle(self, vesicle: int) -> Self:
         """Return the term of one vesicle.

@@ -138,6 +138,8 @@ class TimeLoop:
 
     def begin(self) -> None:
         """Prepare the first step."""
+        for criterion in self._criteria:
+            criterion.begin(self._history)
         self.segment.begin(self.time, self.state, self._scene.latest_time, self.error)
 
     def advance(self) -> bool:

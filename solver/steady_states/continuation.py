@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 _KEPT_EIGENVALUES = 6
 _CONVERGED = 1e-9
-_ITERATIONS = 6
+_ITERATIONS = 24  # where branches meet convergence is linear: the Jacobian leaves refined quadratures out
 # Where branches meet, the equations hardly determine one direction, and round-off there is magnified.
 _RANK = 1e-10
 _ROUND_OFF = 1e-4

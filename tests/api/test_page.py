@@ -135,6 +135,7 @@ def across(page: Page) -> float:
     return box["x"]
 
 
+@pytest.mark.long  # 60 s
 def test_a_submitted_study_is_shown_while_its_brackets_close(page: Page, url: str) -> None:
     page.goto(f"{url}/#/new?preset=critical-hamaker")
     expect(page.get_by_text("At most 90 runs")).to_be_visible()

@@ -86,6 +86,15 @@ class Criterion(ABC):
         bool
         """
 
+    def begin(self, history: History) -> None:  # noqa: B027  most criteria need not know the start
+        """Take note of the start of the run.
+
+        Parameters
+        ----------
+        history : History
+            At time 0.
+        """
+
     @abstractmethod
     def decide(self, history: History) -> Outcome | None:
         """Return what the run has become, None while that is open.

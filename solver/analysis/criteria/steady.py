@@ -59,6 +59,15 @@ class Steady(Criterion):
         """
         return not Revolved.applies_to(scene)
 
+    def begin(self, history: History) -> None:
+        """Compare the end of the first step with the start: it may be the only step.
+
+        Parameters
+        ----------
+        history : History
+        """
+        self._earlier = history.time, history.state
+
     def decide(self, history: History) -> Outcome | None:
         """Return the outcome once all is at rest.
 
