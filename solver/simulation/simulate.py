@@ -171,7 +171,7 @@ def _start(scene: Scene, points: int, parallel: Parallel, should_stop: Callable[
 
 
 def _has_circle(scene: Scene) -> bool:
-    """Tell whether a vesicle is a circle, which has no other shape near, so that nothing is to be examined."""
+    """Tell whether a vesicle is a circle: it has no other shape near, and nothing is to be examined."""
     return any(vesicle.reduced_area > 1 - ROUNDNESS for vesicle in scene.vesicles)
 
 
