@@ -135,8 +135,8 @@ def indices_within(grid: GeometricGrid, limits: tuple[float, float]) -> range:
     return indices
 
 
-class CriticalValueSearch:
-    """The search for a critical value on a grid, within limits.
+class GridSearch:
+    """The values of a grid within limits, what is known of them, and which of them are being tried.
 
     Parameters
     ----------
@@ -144,49 +144,18 @@ class CriticalValueSearch:
         The values that may be tried.
     limits : (float, float)
         Least and greatest value that may be tried, 0 < low < high.
-    guess : (float, float), optional
-        Where the critical value is expected.  It decides only what is tried first; it may be wrong.
 
     Raises
     ------
     ValueError
-        If fewer than two grid values lie within the limits, or the guess is not 0 < low <= high.
+        If fewer than two grid values lie within the limits.
     """
 
-    def __init__(
-        self, grid: GeometricGrid, limits: tuple[float, float], guess: tuple[float, float] | None = None
-    ) -> None:
+    def __init__(self, grid: GeometricGrid, limits: tuple[float, float]) -> None:
         self._grid = grid
         self._indices = indices_within(grid, limits)
         self._sides: dict[int, Side] = {}
         self._pending: set[int] = set()
-        self._prior: _Prior = _UniformPrior() if guess is None else self._prior_of(guess)
-
-    def copy(self) -> CriticalValueSearch:
-        """Return a search that has come as far as this one and goes on without it."""
-        other = copy.copy(self)
-        other._sides, other._pending = dict(self._sides), set(self._pending)
-        return other
-
-    def ask(self) -> float | None:
-        """Return the most useful value to try now and mark it as pending.
-
-        Of all values that may narrow the bracket it is the one that halves the most probable interval
-        between values that are known or pending.  For a single worker that is bisection.  For several it
-        minimizes the interval that is expected to remain after all pending answers.
-
-        Returns
-        -------
-        float or None
-            None if no value is useful now.
-        """
-        gaps = [gap for region in self._regions() for gap in self._between_pending(*region)]
-        if not gaps:
-            return None
-        low, high = max(gaps, key=lambda gap: self._prior.weight(*gap))
-        index = min(max(round(self._prior.median(low, high)), low + 1), high - 1)
-        self._pending.add(index)
-        return self._grid.value(index)
 
     def tell(self, value: float, side: Side) -> None:
         """Take the answer for a value, whether or not it was asked for.
@@ -227,6 +196,82 @@ class CriticalValueSearch:
             raise ValueError(f"{value!r} is not pending")
         self._pending.remove(index)
 
+    def _index(self, value: float) -> int:
+        index = self._grid.index(value)
+        if index not in self._indices:
+            first, last = self._grid.value(self._indices[0]), self._grid.value(self._indices[-1])
+            raise ValueError(f"{value!r} is outside the limits [{first}, {last}]")
+        return index
+
+    def _try(self, index: int) -> float:
+        """Mark a value as pending and return it."""
+        self._pending.add(index)
+        return self._grid.value(index)
+
+    def _values(self, low: int, high: int) -> tuple[float | None, float | None]:
+        """Return the values of two indices; None for one beyond the limits."""
+        return (
+            self._grid.value(low) if low in self._indices else None,
+            self._grid.value(high) if high in self._indices else None,
+        )
+
+    def _guessed(self, guess: tuple[float, float]) -> tuple[int, int]:
+        """Return the indices nearest to the ends of a guess, which need not lie within the limits."""
+        low, high = guess
+        if not 0 < low <= high < math.inf:
+            raise ValueError(f"guess: [{low}, {high}] — must be 0 < low <= high")
+        return self._grid.nearest(low), self._grid.nearest(high)
+
+
+class CriticalValueSearch(GridSearch):
+    """The search for a critical value on a grid, within limits.
+
+    Parameters
+    ----------
+    grid : GeometricGrid
+        The values that may be tried.
+    limits : (float, float)
+        Least and greatest value that may be tried, 0 < low < high.
+    guess : (float, float), optional
+        Where the critical value is expected.  It decides only what is tried first; it may be wrong.
+
+    Raises
+    ------
+    ValueError
+        If fewer than two grid values lie within the limits, or the guess is not 0 < low <= high.
+    """
+
+    def __init__(
+        self, grid: GeometricGrid, limits: tuple[float, float], guess: tuple[float, float] | None = None
+    ) -> None:
+        super().__init__(grid, limits)
+        self._prior: _Prior = _UniformPrior() if guess is None else self._prior_of(guess)
+
+    def copy(self) -> CriticalValueSearch:
+        """Return a search that has come as far as this one and goes on without it."""
+        other = copy.copy(self)
+        other._sides, other._pending = dict(self._sides), set(self._pending)
+        return other
+
+    def ask(self) -> float | None:
+        """Return the most useful value to try now and mark it as pending.
+
+        Of all values that may narrow the bracket it is the one that halves the most probable interval
+        between values that are known or pending.  For a single worker that is bisection.  For several it
+        minimizes the interval that is expected to remain after all pending answers.
+
+        Returns
+        -------
+        float or None
+            None if no value is useful now.
+        """
+        gaps = [gap for region in self._regions() for gap in self._between_pending(*region)]
+        if not gaps:
+            return None
+        low, high = max(gaps, key=lambda gap: self._prior.weight(*gap))
+        index = min(max(round(self._prior.median(low, high)), low + 1), high - 1)
+        return self._try(index)
+
     def replace_guess(self, guess: tuple[float, float]) -> None:
         """Replace the guess, as long as there are no answers.
 
@@ -253,11 +298,7 @@ class CriticalValueSearch:
     @property
     def bracket(self) -> tuple[float | None, float | None]:
         """The largest value known to be low and the smallest known to be high; None where unknown."""
-        low, high = self.ends()
-        return (
-            self._grid.value(low) if low in self._indices else None,
-            self._grid.value(high) if high in self._indices else None,
-        )
+        return self._values(*self.ends())
 
     @property
     def contradictions(self) -> tuple[float, ...]:
@@ -306,18 +347,8 @@ class CriticalValueSearch:
         return () if low is None or high is None else ((low, high),)
 
     def _prior_of(self, guess: tuple[float, float]) -> _Prior:
-        low, high = guess
-        if not 0 < low <= high < math.inf:
-            raise ValueError(f"guess: [{low}, {high}] — must be 0 < low <= high")
-        first, last = self._grid.nearest(low), self._grid.nearest(high)
+        first, last = self._guessed(guess)
         return _CauchyPrior(center=(first + last) / 2, half_width=max((last - first) / 2, 1))
-
-    def _index(self, value: float) -> int:
-        index = self._grid.index(value)
-        if index not in self._indices:
-            first, last = self._grid.value(self._indices[0]), self._grid.value(self._indices[-1])
-            raise ValueError(f"{value!r} is outside the limits [{first}, {last}]")
-        return index
 
     def ends(self) -> tuple[int, int]:
         """Return the indices of the bracket's ends, one beyond the limits where an end is unknown.

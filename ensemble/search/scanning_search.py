@@ -24,7 +24,7 @@ from collections.abc import Iterable, Iterator
 from itertools import chain, pairwise
 
 from ensemble.config.geometric_grid import GeometricGrid
-from ensemble.search.critical_value import CriticalValueSearch, SearchStatus, Side, indices_within
+from ensemble.search.critical_value import CriticalValueSearch, GridSearch, SearchStatus, Side
 
 _OPPOSITE = {Side.LOW: Side.HIGH, Side.HIGH: Side.LOW}
 
@@ -89,7 +89,7 @@ class _Bisection:
         return None if value is None else self._grid.index(value)
 
 
-class ScanningSearch:
+class ScanningSearch(GridSearch):
     """The search for all changes of side on a grid, within limits, that a scan can see.
 
     Parameters
@@ -117,14 +117,11 @@ class ScanningSearch:
         density: int,
         guess: tuple[float, float] | None = None,
     ) -> None:
-        self._grid = grid
-        self._indices = indices_within(grid, limits)
+        super().__init__(grid, limits)
         self._density = min(density, grid.points_per_decade)
         self._center = (self._indices[0] + self._indices[-1]) / 2
         if guess is not None:
             self.replace_guess(guess)
-        self._sides: dict[int, Side] = {}
-        self._pending: set[int] = set()
         # What the answer rests on, also beyond the limits; the awaited values have no answer yet.
         self._looked_at = set(self._lattice())
         self._awaited = {index for index in self._looked_at if index in self._indices}
@@ -144,8 +141,7 @@ class ScanningSearch:
         """
         for index in chain(self._certain(), self._ahead()):
             if index not in self._pending:
-                self._pending.add(index)
-                return self._grid.value(index)
+                return self._try(index)
         return None
 
     def tell(self, value: float, side: Side) -> None:
@@ -163,33 +159,8 @@ class ScanningSearch:
         ValueError
             If the value is not on the grid or outside the limits, or is known to lie on another side.
         """
-        index = self._grid.index(value)
-        if index not in self._indices:
-            first, last = self._grid.value(self._indices[0]), self._grid.value(self._indices[-1])
-            raise ValueError(f"{value!r} is outside the limits [{first}, {last}]")
-        known = self._sides.setdefault(index, side)
-        if known is not side:
-            raise ValueError(f"{value!r} cannot be {side}: it is known to be {known}")
-        self._pending.discard(index)
+        super().tell(value, side)
         self._advance()
-
-    def withdraw(self, value: float) -> None:
-        """Give back a pending value whose run was cancelled or lost; it may be asked for again.
-
-        Parameters
-        ----------
-        value : float
-            A pending one.
-
-        Raises
-        ------
-        ValueError
-            If the value is not pending.
-        """
-        index = self._grid.index(value)
-        if index not in self._pending:
-            raise ValueError(f"{value!r} is not pending")
-        self._pending.remove(index)
 
     def replace_guess(self, guess: tuple[float, float]) -> None:
         """Replace the guess.
@@ -204,10 +175,7 @@ class ScanningSearch:
         ValueError
             If the guess is not 0 < low <= high.
         """
-        low, high = guess
-        if not 0 < low <= high < math.inf:
-            raise ValueError(f"guess: [{low}, {high}] — must be 0 < low <= high")
-        self._center = (self._grid.nearest(low) + self._grid.nearest(high)) / 2
+        self._center = sum(self._guessed(guess)) / 2
 
     def unneeded(self) -> frozenset[float]:
         """Return the pending values whose answers are no longer needed."""
@@ -251,11 +219,7 @@ class ScanningSearch:
     @property
     def bracket(self) -> tuple[float | None, float | None]:
         """The answer, as far as it is known; None for an end that is outside the limits."""
-        low, high = self._answer or self._highest_rise(self._looked_at | self._sides.keys())
-        return (
-            self._grid.value(low) if low in self._indices else None,
-            self._grid.value(high) if high in self._indices else None,
-        )
+        return self._values(*(self._answer or self._highest_rise(self._looked_at | self._sides.keys())))
 
     @property
     def changes(self) -> tuple[tuple[float, float], ...]:
