@@ -20,9 +20,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# A vesicle whose reduced area is less than this below 1 is circular: its curvature varies by 3e-5 at most.
-ROUNDNESS = 1e-9
-
 
 @dataclass(frozen=True)
 class Membranes:
@@ -37,7 +34,7 @@ class Membranes:
         N, on each vesicle.
     length, bending_modulus : (M,)
     circular : (M,) of bool
-        Which vesicles are circles, up to `ROUNDNESS`, and have a viscosity contrast.  Without a contrast
+        Which vesicles are circles and have a viscosity contrast.  Without a contrast
         round-off leaves the tension operator of a circle positive, and nothing is to be projected out.
     multiplicity : int
         1, or 2 with images.
@@ -69,7 +66,7 @@ class Membranes:
             points,
             np.array([vesicle.length for vesicle in vesicles]),
             np.array([vesicle.bending_modulus for vesicle in vesicles]),
-            np.array([v.reduced_area > 1 - ROUNDNESS and v.viscosity_contrast != 1 for v in vesicles]),
+            np.array([v.is_circle and v.viscosity_contrast != 1 for v in vesicles]),
             multiplicity,
         )
 

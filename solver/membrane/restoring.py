@@ -24,7 +24,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.compilation import compiled
-from solver.membrane.geometry import ROUNDNESS
 from solver.membrane.spectral import highest_modes, integration
 
 if TYPE_CHECKING:
@@ -146,7 +145,8 @@ class Restoring:
         """
         reduced_area = np.array([vesicle.reduced_area for vesicle in vesicles])
         # No change of shape leads the area of a circle back: it is the largest for its length.
-        return cls(reduced_area, np.where(reduced_area > 1 - ROUNDNESS, 0.0, shape_rates(vesicles, scene)))
+        circles = [vesicle.is_circle for vesicle in vesicles]
+        return cls(reduced_area, np.where(circles, 0.0, shape_rates(vesicles, scene)))
 
     def of_vesicle(self, vesicle: int) -> Self:
         """Return the term of one vesicle.

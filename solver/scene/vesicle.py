@@ -8,6 +8,9 @@ from pydantic import Field
 
 from solver.model import Model, Positive
 
+# A vesicle whose reduced area is less than this below 1 is circular: its curvature varies by 3e-5 at most.
+_ROUNDNESS = 1e-9
+
 
 class Vesicle(Model):
     """An inextensible membrane that starts as an ellipse of exactly this reduced area and length.
@@ -34,3 +37,8 @@ class Vesicle(Model):
     viscosity_contrast: Positive = 1.0
     center: tuple[float, float] = (0.0, 0.0)
     angle: float = math.pi / 2
+
+    @property
+    def is_circle(self) -> bool:
+        """Whether it is a circle up to round-off, which has the largest area for its length."""
+        return self.reduced_area > 1 - _ROUNDNESS

@@ -15,7 +15,7 @@ from solver.analysis import averages
 from solver.analysis.run import HOPELESS_SPATIAL, LARGEST_SPATIAL, Energy, Outcome, Run, Work
 from solver.forces.tension import TensionNotFoundError
 from solver.integrators import StepFailedError
-from solver.membrane.geometry import ROUNDNESS, Membranes
+from solver.membrane.geometry import Membranes
 from solver.motion.terms import accurate_equation, equation_of_motion
 from solver.parallel import SERIAL, Parallel, first_rank_asks
 from solver.simulation.blas_threads import one_blas_thread
@@ -90,7 +90,9 @@ def simulate(
         should_stop = first_rank_asks(parallel, should_stop)
         require_time = _wall_limit(scene, parallel, began)
         equation_of = partial(equation_of_motion, parallel=parallel)
-        examine = None if scene.many or _has_circle(within) else partial(_examined, within)
+        # A circle has no other shape near: there is nothing to examine.
+        has_circle = any(vesicle.is_circle for vesicle in scene.vesicles)
+        examine = None if scene.many or has_circle else partial(_examined, within)
         placed = with_points(within, start.points)
         loop = TimeLoop(placed, start.state, resolution, equation_of, parallel, frame, examine)
         failure = None
@@ -168,11 +170,6 @@ def _start(scene: Scene, points: int, parallel: Parallel, should_stop: Callable[
     computed = slice(membranes.count)  # the others are images
     last = membranes.pack(frames.tangent_angle[-1, computed], frames.center[-1, computed])
     return _Start(points, rotated_state(membranes, last, scene.start.tilt), evaluations)
-
-
-def _has_circle(scene: Scene) -> bool:
-    """Tell whether a vesicle is a circle: it has no other shape near, and nothing is to be examined."""
-    return any(vesicle.reduced_area > 1 - ROUNDNESS for vesicle in scene.vesicles)
 
 
 def _examined(scene: Scene, membranes: Membranes, state: Array) -> Rest:
