@@ -87,12 +87,12 @@ class Criterion(ABC):
         """
 
     def begin(self, history: History) -> None:  # noqa: B027  most criteria need not know the start
-        """Take note of the start of the run.
+        """Take note of a state with which steps begin: the start, or one that was resampled or perturbed.
 
         Parameters
         ----------
         history : History
-            At time 0.
+            In that state.
         """
 
     @abstractmethod

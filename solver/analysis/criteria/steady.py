@@ -42,8 +42,8 @@ class Steady(Criterion):
         super().__init__(scene)
         self._leaves = False  # an unstable state, and has not moved yet
         self._again = 0.0  # when a slow motion is examined again
-        self._earlier: tuple[float, Array] | None = None  # with which a state is compared
-        self._moved = 0.0  # when it last moved
+        self._earlier: tuple[float, Array]  # with which a state is compared
+        self._moved: float  # when it last moved
 
     @classmethod
     def applies_to(cls, scene: Scene) -> bool:
@@ -60,13 +60,13 @@ class Steady(Criterion):
         return not Revolved.applies_to(scene)
 
     def begin(self, history: History) -> None:
-        """Compare the end of the first step with the start: it may be the only step.
+        """Compare what follows with this state, which may have been resampled or perturbed.
 
         Parameters
         ----------
         history : History
         """
-        self._earlier = history.time, history.state
+        self._earlier, self._moved = (history.time, history.state), history.time
 
     def decide(self, history: History) -> Outcome | None:
         """Return the outcome once all is at rest.
@@ -97,12 +97,11 @@ class Steady(Criterion):
 
     def _at_rest(self, history: History) -> bool:
         criteria, time, state = self._scene.criteria, history.time, history.state
-        if self._earlier is None or self._earlier[1].shape != state.shape:  # the number of points has changed
-            self._earlier, self._moved = (time, state), time
-        duration = time - self._earlier[0]
+        earlier, before = self._earlier
+        duration = time - earlier
         # Over a short step the noise of the integrator would pass for motion.
         if duration >= _COMPARED * criteria.steady_time:
-            if state_rate(history.membranes, state - self._earlier[1], duration) > criteria.steady_rate:
+            if state_rate(history.membranes, state - before, duration) > criteria.steady_rate:
                 self._moved = time
             self._earlier = time, state
         return time - self._moved >= criteria.steady_time
