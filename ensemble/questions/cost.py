@@ -7,9 +7,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from solver.scene import Scene
+from solver.scene.scene import MOST_RECORDS
 
 # What a run may record: it is held in memory until the run ends.
-MOST_RECORDS = 1_000_000
 MOST_RECORDED_POINTS = 100_000_000
 
 _ENDS = 2  # the first and the last state are recorded whatever the interval

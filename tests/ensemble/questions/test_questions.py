@@ -10,10 +10,10 @@ import pytest
 from ensemble.config.documents import load_scene, load_study, preset_document, preset_names
 from ensemble.config.run_key import run_key
 from ensemble.questions import kind_named, kind_of, kind_of_model, kinds, preset_question
-from ensemble.questions.cost import MOST_RECORDS
 from ensemble.questions.scene_question import SceneQuestion
 from ensemble.questions.study_question import StudyQuestion
 from solver.scene import Numerics
+from solver.scene.scene import MOST_RECORDS
 
 
 def test_markers_and_names_tell_the_kinds_apart() -> None:
