@@ -33,6 +33,7 @@ Changes = Annotated[
     ),
 ]
 StorePath = Annotated[Path, typer.Option("--store", metavar="DIR", help="Directory of the store.")]
+NoStore = Annotated[bool, typer.Option("--no-store", help="Keep nothing.")]
 Filters = Annotated[
     list[str],
     typer.Option(metavar="CONDITION", help="For example flow.rate>=0.5 or outcome=bound.  Repeatable."),

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
+import typer
 from rich.text import Text
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
     from rich.table import Table
+
+    from ensemble.questions import Answer
 
 
 def print_json(document: Any) -> None:
@@ -42,6 +45,29 @@ def print_table(table: Table) -> None:
         print("\t".join(_text(column.header) for column in columns))
     for row in zip(*(column.cells for column in columns), strict=True):
         print("\t".join(map(_text, row)))
+
+
+def print_answer(answer: Answer, as_json: bool) -> NoReturn:
+    """Print an answer and exit, with status 1 if it is not complete.
+
+    Parameters
+    ----------
+    answer : Answer
+    as_json : bool
+        Whether it is printed as one JSON document.
+
+    Raises
+    ------
+    typer.Exit
+        When it has been printed.
+    """
+    if as_json:
+        print_json(answer.json_document())
+    else:
+        print_table(answer.table())
+        if answer.footer is not None:
+            print(answer.footer)
+    raise typer.Exit(0 if answer.complete else 1)
 
 
 def _text(cell: RenderableType) -> str:

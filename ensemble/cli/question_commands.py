@@ -10,8 +10,17 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
-from ensemble.cli.options import AsJson, Changes, Document, ProgressAs, ProgressFormat, RanksPerRun, StorePath
-from ensemble.cli.printing import print_json, print_table
+from ensemble.cli.options import (
+    AsJson,
+    Changes,
+    Document,
+    NoStore,
+    ProgressAs,
+    ProgressFormat,
+    RanksPerRun,
+    StorePath,
+)
+from ensemble.cli.printing import print_answer
 from ensemble.config.defaults import DEFAULT_STORE, DEFAULT_STUDY
 
 if TYPE_CHECKING:
@@ -46,7 +55,7 @@ def run(  # numpydoc ignore=PR01
     scene: Document,
     changes: Changes = [],  # noqa: B006
     store: StorePath = DEFAULT_STORE,
-    no_store: Annotated[bool, typer.Option("--no-store", help="Keep nothing.")] = False,
+    no_store: NoStore = False,
     again: Annotated[
         bool, typer.Option("--again", help="Make the run although the store has it; that one is set aside.")
     ] = False,
@@ -130,13 +139,7 @@ def answer_and_print(
     answer = _answer(kind_named(kind), name_or_path, changes, store, ranks_per_run, for_program)
     if answer is None:
         raise typer.Exit(0)
-    if as_json:
-        print_json(answer.json_document())
-    else:
-        print_table(answer.table())
-        if answer.footer is not None:
-            print(answer.footer)
-    raise typer.Exit(0 if answer.complete else 1)
+    print_answer(answer, as_json)
 
 
 def _answer(

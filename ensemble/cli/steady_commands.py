@@ -7,16 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ensemble.cli.options import AsJson, Changes, Document, StorePath
-from ensemble.cli.printing import print_json, print_table
+from ensemble.cli.options import AsJson, Changes, Document, NoStore, StorePath
+from ensemble.cli.printing import print_answer
 from ensemble.config.defaults import DEFAULT_STORE
 from ensemble.errors import refusing
 from ensemble.mpi.world import launched_rank
 
 if TYPE_CHECKING:
     from ensemble.questions import Answer
-
-NoStore = Annotated[bool, typer.Option("--no-store", help="Keep nothing.")]
 
 
 def steady(  # numpydoc ignore=PR01
@@ -69,11 +67,4 @@ def _print(answer_of: Callable[[], Answer], as_json: bool) -> None:
     """Print an answer that the first rank computes alone, and exit."""
     if launched_rank() != 0:
         raise typer.Exit
-    answer = answer_of()
-    if as_json:
-        print_json(answer.json_document())
-    else:
-        print_table(answer.table())
-        if answer.footer is not None:
-            print(answer.footer)
-    raise typer.Exit(0 if answer.complete else 1)
+    print_answer(answer_of(), as_json)
