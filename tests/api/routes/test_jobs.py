@@ -253,8 +253,8 @@ def test_the_estimate_is_points_times_vesicles_times_time(submitting):
         "/estimate", json={"preset": "critical-hamaker", "set": {"search.certify": True}}
     ).json()
     assert certified["runs"] == study["runs"] + 2 * 6
-    assert study["cost"] == study["runs"] * 64 * 2 * 800.0 * 4
-    assert certified["cost"] == study["cost"] + 2 * 6 * 128 * 2 * 800.0 * 4
+    assert study["cost"] == study["runs"] * 64 * 2 * 1600.0 * 4
+    assert certified["cost"] == study["cost"] + 2 * 6 * 128 * 2 * 1600.0 * 4
 
 
 def test_a_job_that_costs_too_much_is_refused_with_the_number(store):

@@ -158,7 +158,7 @@ from ensemble.config.documents import load_scene
 
 COARSE = ("numerics.points=32", "criteria.steady_time=1e9")
 LONG, SHORT = (
-    load_scene("vesicle-shear", [*COARSE, f"horizon={horizon}", f"output.interval={horizon / 1e5}"])
+    load_scene("vesicle-shear", [*COARSE, f"horizon={horizon}", "output.interval=10"])
     for horizon in (1e6, 2.0)
 )
 
