@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import ClassVar
 
 # What is answered where a disk, a quota or the largest size of a file is reached.
 FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
@@ -40,15 +41,21 @@ class NotStored(StoreInputError):  # noqa: N818
 class Interrupted(BaseException):
     """A signal asked this process to end.
 
+    Compiled code and libraries that this exception passes through may turn it into errors of their own, so
+    the latest one is kept.
+
     Parameters
     ----------
     number : int
         The signal.
     """
 
+    latest: ClassVar[Interrupted | None] = None
+
     def __init__(self, number: int) -> None:
         super().__init__(number)
         self.status = 128 + number
+        Interrupted.latest = self
 
 
 @contextmanager

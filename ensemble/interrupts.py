@@ -20,6 +20,7 @@ PARENT_CHECK_SECONDS = 0.2
 LAUNCHER_CONNECTION = "PMI_FD"  # number of the open socket to the launcher's helper, where there is one
 HYDRA = "HYDI_CONTROL_FD"  # set by the launcher of MPICH
 PR_SET_PDEATHSIG = 1
+STANDARD_ERROR = 2
 SHOW_CURSOR = "\x1b[?25h"  # a progress display hides it
 
 
@@ -27,10 +28,12 @@ def end_with_one_line() -> None:
     """Make SIGINT and SIGTERM end this process within two seconds, whatever it is doing.
 
     Alone, the process unwinds: `Interrupted` is raised, and what it was writing is removed.  If a thread
-    keeps it, or a library swallows the exception, it is ended after `UNWINDING_SECONDS`.  Under an MPI
-    launcher the main thread may be inside a collective that never returns, because another rank has ended
-    already.  So there another thread ends the process at once.  Nothing is lost by that: a run exists once it
-    is committed, and what is not committed is adopted or removed when the store is opened next.
+    keeps it, or a library swallows the exception, it is ended after `UNWINDING_SECONDS`.  What libraries
+    print on the way is not shown.
+
+    Under an MPI launcher the main thread may be inside a collective that never returns, because another rank
+    has ended already.  So there another thread ends the process at once.  Nothing is lost by that: a run
+    exists once it is committed, and what is not committed is adopted or removed when the store is opened next.
     """
     if launched_size() == 1:
         for number in SIGNALS:
@@ -43,6 +46,16 @@ def end_with_one_line() -> None:
     # Written to by the signal itself, whatever Python is doing at the time.
     signal.set_wakeup_fd(writer)
     threading.Thread(target=_end, args=(reader,), name="signals", daemon=True).start()
+
+
+def let_answer_stand() -> None:
+    """Ignore signals from now on, if this process is alone: its work is done and its answer is given.
+
+    The interpreter still has to end; a signal meanwhile would turn success into a failure.
+    """
+    if launched_size() == 1:
+        for number in SIGNALS:
+            signal.signal(number, signal.SIG_IGN)
 
 
 def end_with_launcher() -> None:
@@ -82,10 +95,9 @@ def _unwind(number: int, _: FrameType | None) -> None:
     interruption = Interrupted(number)
     for again in SIGNALS:  # a second signal ends the process at once
         signal.signal(again, lambda *_: os._exit(interruption.status))
-    # Whatever comes of it, in a destructor or in a library, is no error to be shown.
-    sys.unraisablehook = lambda _: None
-    sys.excepthook = lambda *_: os._exit(interruption.status)
     _say_interrupted()
+    # Whatever comes of it, in a destructor or in a library, is no error to be shown.
+    os.dup2(os.open(os.devnull, os.O_WRONLY), STANDARD_ERROR)
     watchdog = threading.Timer(UNWINDING_SECONDS, os._exit, (interruption.status,))
     watchdog.daemon = True
     watchdog.start()

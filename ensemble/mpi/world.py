@@ -226,7 +226,7 @@ def abort_guard(communicator: Intracomm | None) -> Iterator[None]:
     """End the whole job, with status 1, when an exception leaves the block on this rank.
 
     Otherwise the other ranks would wait for this one for ever.  `BadInput` passes: it comes from `on_root`
-    and leaves the block on every rank.  So does `Interrupted`, which is raised only where there is one rank.
+    and leaves the block on every rank.  So does an interruption: it is raised only where there is one rank.
 
     Parameters
     ----------
@@ -235,10 +235,10 @@ def abort_guard(communicator: Intracomm | None) -> Iterator[None]:
     """
     try:
         yield
-    except (BadInput, SystemExit, Interrupted):
+    except (BadInput, SystemExit):
         raise
     except BaseException as error:
-        if communicator is None:
+        if communicator is None or Interrupted.latest is not None:
             raise
         line = told_in_a_line(error)
         text = traceback.format_exc() if line is None else f"ensemble: {line}"

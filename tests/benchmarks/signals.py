@@ -4,7 +4,7 @@
 
 Each try starts `ensemble bisect`, alone or on one to four ranks, and sends SIGINT, SIGTERM or SIGKILL to the
 launcher, its proxy, a rank, or to the launcher's process group as a terminal does.  The next try goes on in
-the same store, until a job comes to its end before its signal.  The figures are printed as JSON.
+the same store, until a job has given its answer before its signal.  The figures are printed as JSON.
 
 MPICH's proxy itself ignores SIGINT and SIGTERM, and tells nobody.  Then the job must come to its end as if
 nothing had happened; such tries are counted apart.
@@ -91,6 +91,7 @@ class Job:
 
     def __init__(self, ranks: int, store: Path) -> None:
         self._mark = uuid4().hex
+        self._known: set[psutil.Process] = set()
         beside = Path(sys.executable).parent
         command = [sys.executable, "-m", "ensemble", *STUDY, f"--store={store}"]
         if ranks != ALONE:
@@ -109,9 +110,13 @@ class Job:
             )
 
     def members(self) -> list[psutil.Process]:
-        """Every process that has come of the job and runs."""
+        """Every process that has come of the job and runs.
+
+        One that ends has no environment any more, and still holds its locks: it is known from before.
+        """
         self.launcher.poll()  # reaps it
-        return alive([process for process in psutil.process_iter() if self._has_mark(process)])
+        self._known.update(process for process in psutil.process_iter() if self._has_mark(process))
+        return alive(list(self._known))
 
     def _has_mark(self, process: psutil.Process) -> bool:
         try:
@@ -127,6 +132,7 @@ class Job:
     def send(self, plan: Plan, chance: random.Random) -> bool:
         """Send the signal, and tell whether there was a process to take it."""
         number = SIGNALS[plan.signal]
+        self.members()
         if plan.victim == "group":
             with suppress(ProcessLookupError):
                 os.killpg(self.launcher.pid, number)
@@ -154,6 +160,14 @@ class Job:
             with suppress(psutil.NoSuchProcess):
                 process.kill()
         self.launcher.wait()
+
+    @property
+    def has_answered(self) -> bool:
+        """Whether it has printed all it had to."""
+        try:
+            return bool(json.loads(self.printed))
+        except json.JSONDecodeError:
+            return False
 
     @property
     def printed(self) -> str:
@@ -217,13 +231,14 @@ class Series:
         finally:
             job.end()
         status = job.launcher.returncode
-        late = status == 0 and seconds is not None and seconds < RACE_SECONDS
+        had_ended = status == 0 or job.has_answered
+        late = had_ended and seconds is not None and seconds < RACE_SECONDS
         if not hit or late:
-            if status == 0:
+            if had_ended:
                 self._complete(job)
             return None
         made = Try(plan, HANG_SECONDS if seconds is None else seconds, status, job.said, left)
-        made.faults = [*_faults(made, job.printed), *_store_faults(self._store, known)]
+        made.faults = [*_faults(made, job.has_answered), *_store_faults(self._store, known)]
         if plan.is_ignored and not made.faults:
             self.ignored += 1
         else:
@@ -260,7 +275,7 @@ class Series:
         }
 
 
-def _faults(made: Try, printed: str) -> list[str]:
+def _faults(made: Try, has_answered: bool) -> list[str]:
     faults = []
     if made.left:
         faults.append("hung")
@@ -272,7 +287,7 @@ def _faults(made: Try, printed: str) -> list[str]:
         faults.append("traceback")
     if made.said.count("ensemble: interrupted") > 1:
         faults.append("more than one line")
-    if "{" in printed.splitlines() and made.status != 0:
+    if has_answered and made.status != 0:
         faults.append("printed")
     return faults
 
