@@ -33,7 +33,7 @@ def end_with_one_line() -> None:
 
     Under an MPI launcher the main thread may be inside a collective that never returns, because another rank
     has ended already.  So there another thread ends the process at once.  Nothing is lost by that: a run
-    exists once it is committed, and what is not committed is adopted or removed when the store is opened next.
+    exists once it is committed; what is not committed is adopted or removed when the store is opened next.
     """
     if launched_size() == 1:
         for number in SIGNALS:
