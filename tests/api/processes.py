@@ -46,13 +46,17 @@ def wait_until(condition: Callable[[], Result], seconds: float = SECONDS) -> Res
 
 
 def alive(processes: Sequence[psutil.Process]) -> list[psutil.Process]:
-    """Return the processes that run. One that has ended and only waits to be reaped does not."""
+    """Return the processes that run.
+
+    One that has ended and only waits to be reaped does not.  While other threads of it still end, it holds
+    its files and their locks.
+    """
     return [process for process in processes if process.is_running() and not _is_zombie(process)]
 
 
 def _is_zombie(process: psutil.Process) -> bool:
     try:
-        return bool(process.status() == psutil.STATUS_ZOMBIE)
+        return bool(process.status() == psutil.STATUS_ZOMBIE) and process.num_threads() <= 1
     except psutil.NoSuchProcess:
         return True
 
