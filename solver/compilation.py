@@ -2,7 +2,8 @@
 
 Their inner loops are plain loops that LLVM turns into SIMD code.  This needs ``error_model="numpy"``, without
 which every division has a branch for zero.  What is compiled is cached on disk for all processes.  The cache
-is a convenience: where it cannot be read or written, functions are compiled as if there were none.
+is a convenience: where it cannot be read or written, functions are compiled as if there were none.  The first
+run on a machine waits for compilation: this module's logger names each function at level INFO.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from functools import cache
 from typing import Any
 
 from numba import njit, types
+from numba.core import event
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.extending import intrinsic
 
@@ -46,6 +48,19 @@ def compiled(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     except RuntimeError as error:  # no directory can be written to
         _say_once(str(error))
     return dispatcher
+
+
+class _Announcer(event.Listener):
+    """Logs the name of each function that is compiled because the cache does not have it."""
+
+    def on_start(self, event: Any) -> None:
+        _log.info("compiling %s", event.data["dispatcher"].py_func.__name__)
+
+    def on_end(self, event: Any) -> None:
+        """Do nothing: the next function is announced, or a result follows."""
+
+
+event.register("numba:compile", _Announcer())
 
 
 @cache

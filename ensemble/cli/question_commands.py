@@ -154,6 +154,7 @@ def _answer(
     from rich.console import Console
 
     from ensemble.config.overrides import parse_override
+    from ensemble.display.compilation import compilation_shown
     from ensemble.errors import refusing
     from ensemble.mpi.groups import chosen_ranks
     from ensemble.mpi.world import abort_guard, launched_size, on_root, world
@@ -170,7 +171,8 @@ def _answer(
 
     with abort_guard(communicator):
         question, ranks = on_root(communicator, prepare)
-        with kind.progress(Console(stderr=True), for_program) as on_change:
+        console = Console(stderr=True)
+        with compilation_shown(console, for_program), kind.progress(console, for_program) as on_change:
             return question.answer(communicator, store, ranks, on_change)
 
 

@@ -17,6 +17,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 from rich.text import Text
 
+from ensemble.display.compilation import compilation_shown
 from ensemble.display.progress_line import ProgressLine
 from ensemble.display.result_tables import boundary_cells, boundary_columns, bracket_text
 
@@ -186,6 +187,8 @@ def _print_line(console: Console, fraction: float, message: str) -> None:
 def report_progress(console: Console) -> Iterator[Callable[[str], None]]:
     """Give a function that shows a line about every run: a live line on a terminal, plain lines elsewhere.
 
+    Compilation, which the first run waits for, is shown as well.
+
     Parameters
     ----------
     console : Console
@@ -196,14 +199,15 @@ def report_progress(console: Console) -> Iterator[Callable[[str], None]]:
         Takes a line of text.
     """
     if not console.is_terminal:
-        yield lambda line: console.print(line, soft_wrap=True, highlight=False, markup=False)
+        with compilation_shown(console):
+            yield lambda line: console.print(line, soft_wrap=True, highlight=False, markup=False)
         return
     columns = (
         BarColumn(pulse_style="cyan"),
         TextColumn("{task.description}", markup=False),
         TimeElapsedColumn(),
     )
-    with Progress(*columns, console=console, transient=True) as progress:
+    with compilation_shown(console), Progress(*columns, console=console, transient=True) as progress:
         task = progress.add_task("", total=None)
         yield lambda line: progress.update(task, description=line)
 

@@ -111,7 +111,7 @@ class JobProgress(Generic[SomeTask]):
     elapsed : float
         Seconds since the start.
     seconds_left : float or None
-        An estimate; None before the first run is finished.
+        An estimate; None before a group has finished its second run.
     """
 
     running: Mapping[int, SomeTask]

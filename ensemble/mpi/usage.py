@@ -44,8 +44,8 @@ class UsageMeter:
         self._clock = clock
         self._start = clock()
         self._intervals: list[list[tuple[float, float]]] = [[] for _ in range(groups)]
-        self._runs = 0
-        self._seconds = 0.0
+        self._later_runs = 0
+        self._later_seconds = 0.0
         self._first_idle: float | None = None
 
     @property
@@ -55,8 +55,8 @@ class UsageMeter:
 
     @property
     def mean_run(self) -> float | None:
-        """Mean seconds of the runs so far; None before the first."""
-        return self._seconds / self._runs if self._runs else None
+        """Mean seconds of the runs that were not a group's first, which waits for the kernels; None at first."""
+        return self._later_seconds / self._later_runs if self._later_runs else None
 
     def record_run(self, group: int, seconds: float) -> None:
         """Record that a group has just finished a simulation.
@@ -69,9 +69,10 @@ class UsageMeter:
             That the simulation took.
         """
         now = self._clock()
+        if self._intervals[group]:
+            self._later_runs += 1
+            self._later_seconds += seconds
         self._intervals[group].append((now - seconds, now))
-        self._runs += 1
-        self._seconds += seconds
 
     def record_idle(self, groups: int) -> None:
         """Record how many groups wait although every useful run is being made.

@@ -90,3 +90,11 @@ def test_without_any_place_for_a_cache_a_function_is_compiled() -> None:
     )
     assert result.stdout == "42\n"
     assert result.stderr.count("compiled functions are not kept") == 1
+
+
+def test_what_is_compiled_is_announced_and_what_is_cached_is_not(script: Path) -> None:
+    loud = "import logging; logging.basicConfig(format='%(message)s', level=logging.INFO)"
+    _, said = run(script, loud)
+    assert "compiling successor" in said.splitlines()
+    _, said = run(script, loud)
+    assert "compiling" not in said

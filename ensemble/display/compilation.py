@@ -1,0 +1,69 @@
+"""Says that functions are being compiled, which the first runs on a machine wait for."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from ensemble.display.progress_line import ProgressLine
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+REPEAT_SECONDS = 10.0
+_LOGGER = "solver.compilation"  # its records of level INFO name the functions
+
+
+@contextmanager
+def compilation_shown(console: Console, for_program: bool = False) -> Iterator[None]:
+    """Print a line when compilation begins within the block, and again while it goes on.
+
+    Parameters
+    ----------
+    console : Console
+        Where it is printed.
+    for_program : bool
+        Whether it is read by a program: then as a `ProgressLine`.
+
+    Yields
+    ------
+    None
+    """
+    logger = logging.getLogger(_LOGGER)
+    handler, level = _Lines(console, for_program), logger.level
+    logger.addHandler(handler)
+    logger.setLevel(logging.INFO)
+    try:
+        yield
+    finally:
+        logger.setLevel(level)
+        logger.removeHandler(handler)
+
+
+class _Lines(logging.Handler):
+    def __init__(self, console: Console, for_program: bool) -> None:
+        super().__init__()
+        self.addFilter(lambda record: record.levelno == logging.INFO)
+        self._console = console
+        self._for_program = for_program
+        self._functions = 0
+        self._begin = self._next = time.monotonic()
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Count a function, and print if it is the first one or some time has passed."""
+        now = time.monotonic()
+        if self._functions == 0:
+            self._begin = self._next = now
+        self._functions += 1
+        if now < self._next:
+            return
+        self._next = now + REPEAT_SECONDS
+        text = "compiling, once on this machine"
+        if self._functions > 1:
+            text += f": {self._functions} functions in {now - self._begin:.0f} s so far"
+        if self._for_program:
+            text = ProgressLine(fraction=0.0, message=text).model_dump_json()
+        self._console.print(text, soft_wrap=True, highlight=False, markup=False)
