@@ -55,7 +55,7 @@ class UsageMeter:
 
     @property
     def mean_run(self) -> float | None:
-        """Mean seconds of the runs that were not a group's first, which waits for the kernels; None at first."""
+        """Mean seconds of a run, but for each group's first, which waits for the kernels; None at first."""
         return self._later_seconds / self._later_runs if self._later_runs else None
 
     def record_run(self, group: int, seconds: float) -> None:
