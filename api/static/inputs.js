@@ -30,6 +30,9 @@ export class FieldInput {
     if (typeof this.field.value === "string") {
       return text;
     }
+    if (this.field.value === null && text === "") {
+      return null;
+    }
     return parsed(text, Array.isArray(this.field.value));
   }
 
@@ -94,6 +97,9 @@ function attributesFor(value) {
   const written = { type: "text", autocomplete: "off", spellcheck: "false" };
   if (typeof value === "number") {
     return { ...written, inputmode: "decimal", value };
+  }
+  if (value === null) {
+    return { ...written, placeholder: "none" };
   }
   return {
     ...written,

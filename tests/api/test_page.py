@@ -16,7 +16,7 @@ import pytest
 from playwright.sync_api import Browser, ConsoleMessage, Page, Response, expect, sync_playwright
 
 from api.auth import TokenScope
-from ensemble.config.documents import load_study
+from ensemble.config.documents import load_scene, load_study, preset_document, preset_names
 from ensemble.config.run_key import run_key
 from ensemble.search.boundary import Boundary
 from ensemble.store import Store
@@ -24,6 +24,7 @@ from solver.analysis.run import Outcome, Run
 from tests.api.processes import wait_until
 from tests.api.servers import make_token, serving
 from tests.api.services import service, start_service
+from tests.ensemble.runs import shear_run
 
 # The default of 5 s is too short on a busy machine.
 expect.set_options(timeout=30_000)
@@ -328,6 +329,29 @@ def test_any_field_may_be_changed(page: Page, url: str) -> None:
     expect(page.get_by_text("cost 4.9×10⁶ of")).to_be_visible()
     further.fill("numerics.pionts = 64")
     expect(page.get_by_role("alert")).to_contain_text("numerics.pionts")
+
+
+def test_every_preset_and_every_stored_scene_can_be_submitted_as_it_is(
+    page: Page, url: str, store: Path
+) -> None:
+    """A stored scene is written in full, with nulls for what it does not have."""
+    scenes = []
+    with Store.open(store) as opened:
+        for name in preset_names():
+            if {"vesicles", "arrangement"} & set(preset_document(name)):
+                scene = load_scene(name, ["numerics.points=32"])
+                opened.commit(opened.stage(shear_run(scene)))
+                scenes.append(run_key(scene))
+    assert len(scenes) > 8
+    for key in scenes:
+        page.goto(f"{url}/#/runs/{key}")
+        page.get_by_role("link", name="Run again with changes").click()
+        expect(page.get_by_text("One run, cost")).to_be_visible()
+        expect(page.get_by_role("button", name="Submit")).to_be_enabled()
+    for name in preset_names():
+        page.goto(f"{url}/#/new?preset={name}")
+        expect(page.get_by_text(re.compile("(One run|At most .* runs), cost"))).to_be_visible()
+        expect(page.get_by_role("button", name="Submit")).to_be_enabled()
 
 
 def test_a_job_is_canceled(page: Page, url: str) -> None:
