@@ -1,7 +1,6 @@
 """`python -m ensemble` and the command `ensemble` are the command line."""
 
 import sys
-import traceback
 
 from ensemble.errors import Interrupted
 from ensemble.interrupts import end_with_launcher, end_with_one_line, let_answer_stand
@@ -28,7 +27,7 @@ def _status(error: BaseException) -> str | int | None:
     if Interrupted.latest is not None:  # whatever has become of it on its way here
         return Interrupted.latest.status
     if not isinstance(error, SystemExit):
-        traceback.print_exception(error)
+        sys.excepthook(type(error), error, error.__traceback__)
     status = error.code if isinstance(error, SystemExit) else 1
     if status not in (None, 0):
         fail_with_others()

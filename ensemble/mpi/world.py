@@ -10,7 +10,6 @@ import os
 import signal
 import sys
 import time
-import traceback
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout
 from typing import TYPE_CHECKING, TypeVar
@@ -240,6 +239,8 @@ def abort_guard(communicator: Intracomm | None) -> Iterator[None]:
     except BaseException as error:
         if communicator is None or Interrupted.latest is not None:
             raise
+        import traceback  # here, because signals are provided for only when this module has been imported
+
         line = told_in_a_line(error)
         text = traceback.format_exc() if line is None else f"ensemble: {line}"
         # The stream of the process: the command line silences sys.stderr on every rank but the first.
