@@ -154,7 +154,7 @@ def _answer(
     from rich.console import Console
 
     from ensemble.config.overrides import parse_override
-    from ensemble.display.compilation import compilation_shown
+    from ensemble.display.compilation_lines import compilation_shown
     from ensemble.errors import refusing
     from ensemble.mpi.groups import chosen_ranks
     from ensemble.mpi.world import abort_guard, launched_size, on_root, world

@@ -17,7 +17,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 from rich.text import Text
 
-from ensemble.display.compilation import compilation_shown
+from ensemble.display.compilation_lines import compilation_shown
 from ensemble.display.progress_line import ProgressLine
 from ensemble.display.result_tables import boundary_cells, boundary_columns, bracket_text
 

@@ -43,7 +43,8 @@ class ImposedFlow(Model, ABC):
         pair that a half turn leaves as it is be computed as one vesicle and its image.
     rotates : bool
         Whether the flow turns a pair, or a single vesicle, round and round.  Then a pair has a period and is
-        bound when it revolves; a single vesicle may tumble.
+        bound when it revolves; a single vesicle may tumble.  Everywhere it must turn lines of any direction
+        the same way, whose sense is read from the gradient at the origin.
     strains : bool
         Whether a pair comes to rest in the flow, side by side or end to end, with an inclination to the
         diverging axis y.

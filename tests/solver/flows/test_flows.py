@@ -104,6 +104,19 @@ def test_a_flow_that_says_so_is_odd(flow: ImposedFlow) -> None:
 
 
 @every_flow
+def test_a_flow_that_rotates_turns_all_lines_the_same_way(flow: ImposedFlow) -> None:
+    """Criteria read direction and sense from the gradient at the origin."""
+    angles = np.linspace(0, np.pi, 50)
+    along, across = np.stack([np.cos(angles), np.sin(angles)]), np.stack([-np.sin(angles), np.cos(angles)])
+    origin = np.zeros((2, 1))
+    turning = np.einsum("ia,ijp,ja->ap", across, flow.velocity_gradient(origin), along)
+    elsewhere = np.einsum("ia,ijp,ja->ap", across, flow.velocity_gradient(POINTS.reshape(2, -1)), along)
+    sense = np.sign(turning.flat[np.argmax(np.abs(turning))])
+    turns_alike = sense != 0 and bool(np.all(sense * elsewhere >= -1e-14))
+    assert turns_alike or not flow.rotates
+
+
+@every_flow
 def test_every_flow_names_its_rate(flow: ImposedFlow) -> None:
     assert flow.title
     assert set(flow.symbols) <= set(type(flow).model_fields)

@@ -9,8 +9,8 @@ import logging
 import pytest
 from rich.console import Console
 
-import ensemble.display.compilation as display
-from ensemble.display.compilation import compilation_shown
+import ensemble.display.compilation_lines as display
+from ensemble.display.compilation_lines import compilation_shown
 
 KERNELS = logging.getLogger("solver.compilation")
 
