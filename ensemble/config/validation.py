@@ -76,7 +76,8 @@ def _suggestions(error: ValidationError, model: type[BaseModel] | TypeAdapter[An
     schema = model.json_schema() if isinstance(model, TypeAdapter) else model.model_json_schema()
     tables = [schema, *schema.get("$defs", {}).values()]
     names = {name for table in tables for name in table.get("properties", {})}
-    similar = [name for name in (nearest(each, sorted(names)) for each in unknown) if name is not None]
+    mistyped = [each for each in unknown if each not in names]  # the others belong to another table
+    similar = [name for name in (nearest(each, sorted(names)) for each in mistyped) if name is not None]
     return f" (did you mean {' and '.join(map(repr, similar))}?)" if similar else ""
 
 

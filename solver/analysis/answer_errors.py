@@ -111,6 +111,8 @@ class AnswerErrors:
         chosen = [inside[k] for k in np.unique(np.linspace(0, len(inside) - 1, _SAMPLES).astype(int))]
         values = np.array([quantity(s.state) for s in chosen])
         changes = np.array([change_of(quantity, s.state, s.error) for s in chosen])
+        if not np.all(np.isfinite(changes)):
+            return np.inf
         times = np.array([first, *(s.time for s in chosen), last])
         duration = last - first
         # Columns: the value, and its two errors.
@@ -151,14 +153,17 @@ def change_of(quantity: Quantity, state: Array, error: Array) -> Array:
     Returns
     -------
     (2,)
-        For each column of the error.
+        For each column of the error.  Infinite if the state without the error has no motion.
     """
     value = quantity(state)
     changes = []
     for column in error.T:
         size = root_mean_square(column)
         part = min(1.0, _LARGEST / size) if size > 0 else 1.0
-        changes.append((value - quantity(state - part * column)) / part)
+        try:
+            changes.append((value - quantity(state - part * column)) / part)
+        except ArithmeticError:
+            changes.append(np.inf)
     return np.array(changes)
 
 

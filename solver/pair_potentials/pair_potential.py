@@ -60,7 +60,8 @@ class PairPotential(Model, ABC):
         """The k of the 1/(s² + d²)^k that the force resembles along a straight membrane at the distance d.
 
         With s the arclength along it, both are singular at s = ±id.  That decides how finely membranes are
-        sampled for each other.  A force that stays finite at r = 0 needs no more than this default.
+        sampled for each other, and the spatial error does not see a value that is too small.  This default is
+        for forces that are finite at r = 0 and change little within their own distance.
 
         Returns
         -------

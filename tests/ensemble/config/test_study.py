@@ -166,6 +166,11 @@ def test_a_mistyped_preset_is_told_the_nearest_one_and_an_unknown_name_all() -> 
     assert all(name in str(refused.value) for name in preset_names())
 
 
+def test_a_field_of_another_table_is_not_suggested_for_itself() -> None:
+    with pytest.raises(ValueError, match=r"adhesion\.reduced_area: 0\.9 — extra inputs are not permitted$"):
+        load_scene("doublet-shear", ["adhesion.reduced_area=0.9"])
+
+
 def test_a_file_that_is_not_toml_is_named(tmp_path: Path) -> None:
     broken = tmp_path / "broken.toml"
     broken.write_text("horizon = = 5", encoding="utf-8")

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 
+from solver.analysis.answer_errors import change_of
 from solver.analysis.run import Outcome, Run
+from solver.forces.tension import TensionNotFoundError
 from solver.scene import Extension, Numerics
 from solver.simulation.simulate import simulate
 from tests.solver.scenes import fixed_horizon, shear_pair
@@ -66,3 +69,16 @@ def test_what_does_not_propagate_errors_reports_none(integrator: str) -> None:
     run = simulate(shear_pair(1.5, numerics=numerics, **fixed_horizon(0.5)))
     assert run.error.global_ is None
     assert run.error.viscosity is None
+
+
+def test_an_error_of_the_state_that_leaves_no_motion_is_infinite() -> None:
+    """The second column leads to a state in which the quantity cannot be computed."""
+
+    def quantity(state: np.ndarray) -> float:
+        if state[1] < 0:
+            raise TensionNotFoundError("no motion")
+        return float(3 * state[0])
+
+    change = change_of(quantity, np.zeros(2), np.array([[1e-3, 0.0], [0.0, 1e-3]]))
+    assert change[0] == pytest.approx(3e-3)
+    assert change[1] == np.inf
