@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -107,12 +108,12 @@ class LineOfCenters(RevolutionTracker):
         -------
         float
         """
-        return float(np.hypot(*self._offset(state)))
+        return math.hypot(*self._offset(state))
 
     def _direction(self, state: Array) -> float:
-        offset = self._offset(state)
-        return float(np.arctan2(offset[1], offset[0]))
+        x, y = self._offset(state)
+        return math.atan2(y, x)
 
-    def _offset(self, state: Array) -> Array:
-        first, second = self.membranes.curve_center(state)
-        return np.asarray(second - first)
+    def _offset(self, state: Array) -> list[float]:
+        (x, y), (second_x, second_y) = self.membranes.curve_center(state).tolist()
+        return [second_x - x, second_y - y]

@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 class ViscosityHistory:
     """The parts of the intrinsic viscosity at the ends of steps, from a step on that is of interest.
 
+    They are measured where the step computed its last rate, if that is close to its end: this costs nothing.
     Steps are as short as the motion needs, so a cubic spline through these values is as accurate as the run.
 
     Parameters
@@ -60,7 +61,7 @@ class ViscosityHistory:
         """
         if not self._times:
             self._take(step.start, step.interpolate(step.start))
-        self._take(step.end, step.state)
+        self._take(step.end, step.state if step.evaluated is None else step.evaluated)
 
     def average(self, first: float, last: float) -> Viscosity | None:
         """Return the average over an interval.

@@ -248,11 +248,11 @@ class DirectAdhesion:
         """
         membranes = geometry.membranes
         size = membranes.count * membranes.points
-        hessian = np.empty((2, size, 2, membranes.multiplicity * size))
+        hessian = np.empty((2, size, 2, size))
         shares, sums = self._sums(geometry, closeness)
         fill_hessian(*sums, self._hamaker, hessian)
         own = hessian[:, shares.own]
-        return shares.gather(geometry.by_state(membranes.fold(own)), axis=1)
+        return shares.gather(geometry.by_state(own), axis=1)
 
     def stiffness(self, geometry: Geometry, closeness: Proximity) -> Array:
         """Compute the derivative of the density at each point by that point.

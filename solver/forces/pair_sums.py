@@ -284,7 +284,7 @@ def fill_hessian(
     hamaker: float,
     hessian: Array,
 ) -> None:
-    """Fill the derivative of `add_density` by the points of all curves.
+    """Fill the derivative of `add_density` by the points of the vesicles, whose images move the opposite way.
 
     Parameters
     ----------
@@ -296,21 +296,24 @@ def fill_hessian(
     parameters : tuple
         Of `formula_and_parameters`.
     hamaker : float
-    hessian : (2, M·N, 2, C·N), written
+    hessian : (2, M·N, 2, M·N), written
     """
-    size = points.shape[2]
+    size, count = points.shape[2], hessian.shape[1] // points.shape[2]
     hessian[:] = 0.0
     for g in range(refinement.groups.shape[0]):
         target, source, factor = refinement.groups[g]
         rows, targets, sources, weights = _group(points, spacing, refinement, g)
         pair = np.empty((3, rows.size, sources.shape[1]))
         pair_hessian(formula, parameters, targets, sources, hamaker * weights[0], pair)
-        first, last = source * size, (source + 1) * size
+        first = source % count * size
+        sign = 1.0 if source < count else -1.0
         for component, (a, b) in enumerate(((0, 0), (0, 1), (1, 1))):
             each = pair[component]
             folded = each if factor == 1 else np.dot(each, interpolation_to(refinement, factor))
             for k in range(rows.size):
                 row = target * size + rows[k]
-                hessian[a, row, b, first:last] = -folded[k]
-                hessian[a, row, b, row] += each[k].sum()
+                by_source, of_row = hessian[a, row, b], folded[k]
+                for j in range(size):
+                    by_source[first + j] -= sign * of_row[j]
+                by_source[row] += each[k].sum()
     hessian[1, :, 0] = hessian[0, :, 1]

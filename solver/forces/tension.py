@@ -78,6 +78,21 @@ class TensionInverse(NamedTuple):
     shifts: Array
 
 
+class TensionEffect(NamedTuple):
+    """What each unit tension causes.
+
+    Attributes
+    ----------
+    velocity : (2, M·N, M·N)
+        S T.
+    turning : (M·N, M·N)
+        n · u_s of that velocity.
+    """
+
+    velocity: Array
+    turning: Array
+
+
 @compiled
 def _conjugate_gradients(
     layer: Array,
@@ -220,7 +235,7 @@ class Inextensibility:
                 return motion, inverse
         raise TensionNotFoundError("the tension could not be found: the membrane is too distorted")
 
-    def factorize(self, layer: Mobility, geometry: Geometry) -> tuple[TensionInverse, Array]:
+    def factorize(self, layer: Mobility, geometry: Geometry) -> tuple[TensionInverse, TensionEffect]:
         """Make the inverse of A for a geometry.
 
         Parameters
@@ -232,8 +247,8 @@ class Inextensibility:
         Returns
         -------
         TensionInverse
-        (2, M·N, M·N)
-            S T, the velocity of each unit tension.
+        TensionEffect
+            Of each unit tension.
 
         Raises
         ------
@@ -246,7 +261,7 @@ class Inextensibility:
         of_tangents = (layer.matrix.reshape(-1, points) @ weighted).reshape(2, count * points, 2, -1)
         of_tangents *= geometry.tangents.reshape(2, -1)
         flow = of_tangents[:, :, 0] + of_tangents[:, :, 1]
-        system = self.stretching(geometry, flow)
+        system, turning = geometry.deformation(flow)
         system *= -np.repeat(membranes.spacing, points)[:, None]
         typical = np.trace(system) / (count * points)
         shifts = typical * np.where(membranes.circular, 1.0, self._elasticity)
@@ -263,23 +278,4 @@ class Inextensibility:
         triangle, _ = lapack.dpotri(factor, lower=0, overwrite_c=1)
         inverse = np.triu(triangle)
         inverse += np.triu(triangle, 1).T
-        return TensionInverse(np.ascontiguousarray(inverse), shifts), flow
-
-    @staticmethod
-    def stretching(geometry: Geometry, velocity: Array) -> Array:
-        """Return how velocities stretch the membranes, x_s · u_s.
-
-        Parameters
-        ----------
-        geometry : Geometry
-        velocity : (2, M·N, columns)
-
-        Returns
-        -------
-        (M·N, columns)
-        """
-        gradient = geometry.column_derivative(velocity)
-        gradient *= geometry.tangents.reshape(2, -1, 1)
-        gradient[0] += gradient[1]
-        stretching: Array = gradient[0]
-        return stretching
+        return TensionInverse(np.ascontiguousarray(inverse), shifts), TensionEffect(flow, turning)

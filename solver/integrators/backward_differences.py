@@ -53,9 +53,31 @@ def newton_weights(order: int, factor: float) -> Array:
         Row j for the value j new steps back; the last column is the first term that a polynomial of this
         order leaves out.
     """
-    steps = -factor * np.arange(order + 1)[:, None]
-    rows = np.arange(order + 1)
-    return np.hstack([np.ones((order + 1, 1)), np.cumprod((steps + rows) / (rows + 1), axis=1)])
+    return np.array([_newton_weights(order + 1, -factor * value) for value in range(order + 1)])
+
+
+def _newton_weights(order: int, steps: float) -> list[float]:
+    """Return the weights of the differences up to an order in the value some steps later."""
+    weights = [1.0]
+    for row in range(order):
+        weights.append(weights[row] * (steps + row) / (row + 1))
+    return weights
+
+
+def combined(weights: Array, table: Array) -> Array:
+    """Return sums of the rows of a table.
+
+    Parameters
+    ----------
+    weights : (k,) or (m, k)
+    table : (k, ...)
+
+    Returns
+    -------
+    (...) or (m, ...)
+    """
+    rows = table.reshape(len(table), -1)  # a product of matrices; `np.tensordot` takes several times as long
+    return np.asarray(weights @ rows).reshape(*weights.shape[:-1], *table.shape[1:])
 
 
 @cache
@@ -93,10 +115,4 @@ def interpolant(table: Array, order: int, time: float, size: float) -> Callable[
         From a time to the value there, (...).
     """
     kept = table[: order + 1].copy()
-    rows = np.arange(order)
-
-    def value(instant: float) -> Array:
-        weights = np.cumprod(((instant - time) / size + rows) / (rows + 1))
-        return np.asarray(kept[0] + np.tensordot(weights, kept[1:], 1))
-
-    return value
+    return lambda instant: combined(np.array(_newton_weights(order, (instant - time) / size)), kept)

@@ -147,6 +147,7 @@ class BackwardDifferentiation:
             interpolate=interpolant(self._table, *history),
             local_error=float(excess * self._tolerance),
             shortened=shortened,
+            evaluated=solution.last.state,
             error=self._error.interpolant(*history) if self._error else None,
         )
 
@@ -234,10 +235,10 @@ class BackwardDifferentiation:
             excesses[0] = _ERROR[order - 1] * root_mean_square(table[order]) / self._tolerance
         if order < MAX_ORDER:
             excesses[2] = _ERROR[order + 1] * root_mean_square(table[order + 2]) / self._tolerance
-        with np.errstate(divide="ignore"):
-            factors = np.array(excesses) ** (-1 / np.arange(order, order + 3))
-        self._order += int(np.argmax(factors)) - 1
-        self._rescale(min(_GROW, safety * factors.max()))
+        factors = [each ** (-1 / (order + k)) if each > 0 else np.inf for k, each in enumerate(excesses)]
+        factor = max(factors)
+        self._order += factors.index(factor) - 1
+        self._rescale(min(_GROW, safety * factor))
 
     def _rescale(self, factor: float) -> None:
         """Change the step size by a factor."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
@@ -26,7 +27,7 @@ def root_mean_square(values: Array) -> float:
     -------
     float
     """
-    return float(np.sqrt(np.mean(values**2)))
+    return math.sqrt(values @ values / values.size)
 
 
 @dataclass(frozen=True)

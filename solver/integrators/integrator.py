@@ -106,6 +106,9 @@ class Step:
         Root mean square of the estimated error that the step added to the state.
     shortened : bool
         Whether a first attempt with a larger step was rejected.
+    evaluated : (n,) or None
+        A state within the step's error of that at the end, in which the rate has just been computed.  None if
+        there is none.
     error : callable or None
         From a time in [start, end] to an array (n, 2).  Its first column is the estimated error of the state
         there: what all steps so far have left in it.  The second one is the same with random signs of the
@@ -118,6 +121,7 @@ class Step:
     interpolate: Callable[[float], Array]
     local_error: float
     shortened: bool
+    evaluated: Array | None = None
     error: Callable[[float], Array] | None = None
 
     def until(self, time: float) -> Self:
@@ -131,7 +135,7 @@ class Step:
         -------
         Step
         """
-        return replace(self, end=time, state=self.interpolate(time))
+        return replace(self, end=time, state=self.interpolate(time), evaluated=None)
 
 
 class Integrator(Protocol):

@@ -21,7 +21,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.integrators.backward_differences import ROWS, differences_of_values, extended, interpolant
+from solver.integrators.backward_differences import (
+    ROWS,
+    combined,
+    differences_of_values,
+    extended,
+    interpolant,
+)
 from solver.integrators.control import root_mean_square
 
 if TYPE_CHECKING:
@@ -119,7 +125,7 @@ class PropagatedError:
         """
         table, order = self._table, step.order
         predicted = table[: order + 1].sum(axis=0)
-        history = np.tensordot(step.weights, table[1 : order + 1], 1)
+        history = combined(step.weights, table[1 : order + 1])
         signs = self._signs()
         source = local_error[:, None] * signs - history
         change = step.solve(step.duration * (step.jacobian @ predicted) + source)
@@ -133,7 +139,7 @@ class PropagatedError:
 
     def _signs(self) -> Array:
         """Return the signs of a source, (2,)."""
-        return np.array([1.0, self._random.choice([-1.0, 1.0])])
+        return np.array([1.0, 2.0 * self._random.integers(2) - 1.0])
 
     def _probe(self, jacobian: Jacobian, error: Array, near: Evaluation) -> _Deviation | None:
         size = root_mean_square(error)
@@ -160,9 +166,9 @@ class PropagatedError:
         left_out : (n,)
             ∇ᵏ⁺¹y of the state, in the old step size.
         """
-        values = np.tensordot(weights[:, :-1], self._table[: order + 1], 1)
+        values = combined(weights[:, :-1], self._table[: order + 1])
         values -= weights[:, -1, None, None] * left_out[:, None] * self._signs()
-        self._table[: order + 1] = np.tensordot(differences_of_values(order), values, 1)
+        self._table[: order + 1] = combined(differences_of_values(order), values)
 
     def interpolant(self, order: int, time: float, size: float) -> Callable[[float], Array]:
         """Return the error between steps; see `interpolant` of `backward_differences`.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -117,7 +117,7 @@ class Membranes:
             )
         return cls.of(vesicles, points, len(scene.vesicles) // len(vesicles))
 
-    @property
+    @cached_property
     def count(self) -> int:
         """Number of vesicles."""
         return len(self.length)
@@ -290,6 +290,21 @@ def _radii(points: Array, centers: Array) -> Array:
     return radii
 
 
+class Deformation(NamedTuple):
+    """How velocities u deform the membranes.
+
+    Attributes
+    ----------
+    stretching : (M·N, columns)
+        x_s · u_s.
+    turning : (M·N, columns)
+        n · u_s.
+    """
+
+    stretching: Array
+    turning: Array
+
+
 class Geometry:
     """Points and tangents of all membranes in one state.
 
@@ -387,21 +402,29 @@ class Geometry:
         np.multiply(integrated[:, :, 1], scaled_x, out=by_angle)
         integrated[:, :, 0] *= scaled_y
         by_angle -= integrated[:, :, 0]
-        result[:, :, size:] = by_points.reshape(2, rows, 2 * count, points).sum(axis=3)
+        result[:, :, size:] = (by_points.reshape(-1, points) @ np.ones(points)).reshape(2, rows, 2 * count)
         return result
 
-    def column_derivative(self, values: Array) -> Array:
-        """Differentiate the columns of vector fields by arclength.
+    def deformation(self, velocity: Array) -> Deformation:
+        """Return how velocities deform the membranes.
 
         Parameters
         ----------
-        values : (2, M·N, columns)
+        velocity : (2, M·N, columns)
+            Each column is a velocity at all points.
 
         Returns
         -------
-        (2, M·N, columns)
+        Deformation
         """
         count, points = self.membranes.count, self.membranes.points
-        derivative: Array = differentiation(points) @ values.reshape(2, count, points, -1)
-        derivative *= self.membranes.wavenumber[:, :, None]
-        return derivative.reshape(values.shape)
+        gradient = differentiation(points) @ velocity.reshape(2, count, points, -1)
+        along_x, along_y = gradient.reshape(velocity.shape)
+        tangent_x, tangent_y = (self.tangents * self.membranes.wavenumber).reshape(2, -1, 1)
+        stretching = tangent_x * along_x
+        turning = tangent_x * along_y
+        along_x *= tangent_y
+        along_y *= tangent_y
+        stretching += along_y
+        turning -= along_x
+        return Deformation(stretching, turning)

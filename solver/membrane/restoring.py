@@ -199,10 +199,12 @@ class Restoring:
         combined = multipliers @ gradients
         cosine, sine = own
         # Second derivatives of the deviations, each (N, N) or the diagonal of such.
-        of_area = 2 * integration(points) * (np.outer(sine, cosine) - np.outer(cosine, sine))
-        of_area[np.diag_indices(points)] += 2 * (cosine * about[1] - sine * about[0])
+        products_of_tangents = np.outer(2 * sine, cosine)
+        of_area = integration(points) * (products_of_tangents - products_of_tangents.T)
+        diagonal = slice(None, None, points + 1)
+        of_area.flat[diagonal] += 2 * (cosine * about[1] - sine * about[0])
         of_all = multipliers[0] * of_area
-        of_all[np.diag_indices(points)] -= multipliers[1] * cosine + multipliers[2] * sine
+        of_all.flat[diagonal] -= multipliers[1] * cosine + multipliers[2] * sine
         by_angle = np.stack([2 * (cosine * about[0] + sine * about[1]), -sine, cosine])
         by_angle -= np.stack([combined @ of_area, -combined * cosine, -combined * sine])
         by_angle -= gradients @ of_all

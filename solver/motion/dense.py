@@ -7,6 +7,7 @@ terms of u are changed (`ViscosityContrast`).
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -34,6 +35,11 @@ if TYPE_CHECKING:
     from solver.potentials.viscosity_contrast import ViscosityContrast
 
 Array = NDArray[np.float64]
+
+
+def _of_steps() -> deque[tuple[Array, Motion]]:
+    """Return what keeps the last evaluations: of a step's end, and of a probe of its error after it."""
+    return deque(maxlen=2)
 
 
 @dataclass
@@ -69,6 +75,7 @@ class DenseEquation:
     evaluations: int = field(default=0, init=False)
     recordings: int = field(default=0, init=False)
     _inverse: TensionInverse | None = field(default=None, init=False)
+    _recent: deque[tuple[Array, Motion]] = field(default_factory=_of_steps, init=False)
     _assembled: tuple[Geometry, Closeness | None] | None = field(default=None, init=False)
 
     @property
@@ -87,6 +94,8 @@ class DenseEquation:
         -------
         Motion
         """
+        if (known := self._known(state)) is not None:
+            return known
         self.recordings += 1
         motion, _ = self._evaluate(state)
         return motion
@@ -102,9 +111,9 @@ class DenseEquation:
         -------
         (state_size,)
         """
-        self.evaluations += 1
-        motion, self._inverse = self._evaluate(state)
-        return motion.rate
+        if (known := self._known(state)) is not None:
+            return known.rate  # an implicit step begins where it has asked for the Jacobian
+        return self._evaluate_for_step(state).rate
 
     def jacobian(self, state: Array) -> DenseJacobian:
         """Compute the derivative of `rate` by the state, for a step.
@@ -119,8 +128,7 @@ class DenseEquation:
         -------
         DenseJacobian
         """
-        self.evaluations += 1
-        motion, self._inverse = self._evaluate(state)
+        motion = self._evaluate_for_step(state)
         geometry = motion.geometry
         adhesion = None
         if self.adhesion and motion.closeness:
@@ -172,13 +180,15 @@ class DenseEquation:
         if self.contrast:
             velocity += self.contrast.jacobian(geometry, motion.velocity)
             velocity = self.contrast.velocity(velocity)
-        stretching = self.inextensibility.stretching(geometry, velocity)
+        stretching, turning = geometry.deformation(velocity)
         every_point = np.arange(motion.rotation_rate.size)
         stretching[every_point, every_point] += motion.rotation_rate.ravel()
         stretching *= weights
-        inverse, tension_flow = self.inextensibility.factorize(self.contrast or self.layer, geometry)
-        velocity += tension_flow @ (inverse.matrix @ stretching)
-        return self._rate_columns(motion, velocity), inverse
+        inverse, effect = self.inextensibility.factorize(self.contrast or self.layer, geometry)
+        tension = inverse.matrix @ stretching
+        turning += effect.turning @ tension
+        drift = self._means(velocity) + self._means(effect.velocity) @ tension
+        return np.concatenate([self._angle_rate_columns(motion, turning), drift]), inverse
 
     def tension_inverse(self, geometry: Geometry) -> TensionInverse:
         """Compute the inverse that preconditions the search for the tension.
@@ -219,6 +229,14 @@ class DenseEquation:
             by_state[1, block, count * points + count + vesicle] = 1.0
         return by_state
 
+    def _evaluate_for_step(self, state: Array) -> Motion:
+        """Compute the motion in a state, and keep what helps with the next ones."""
+        self.evaluations += 1
+        state = state.copy()  # the integrator may go on in its own array, and the motion is kept
+        motion, self._inverse = self._evaluate(state)
+        self._recent.append((state, motion))
+        return motion
+
     def _evaluate(self, state: Array) -> tuple[Motion, TensionInverse]:
         """Compute the motion in a state, and the inverse that served to find its tension."""
         geometry = Geometry(self.membranes, state)
@@ -241,6 +259,10 @@ class DenseEquation:
             geometry, closeness, free.velocity, free.rotation_rate, free.tension, bending, adhesion, restoring
         )
         return motion, inverse
+
+    def _known(self, state: Array) -> Motion | None:
+        """Return the motion in a state in which steps have evaluated it lately."""
+        return next((motion for known, motion in self._recent if np.array_equal(known, state)), None)
 
     def _assemble(self, geometry: Geometry) -> Closeness | None:
         """Fill the matrices for a geometry, unless they are filled for it already."""
@@ -286,19 +308,20 @@ class DenseEquation:
             self.membranes.with_images(centers_by_state, axis=1),
         )
 
-    def _rate_columns(self, motion: Motion, velocity: Array) -> Array:
-        """Return `Motion.rate` for the derivatives of the velocity by the state, (2, M·N, columns)."""
-        count, points = self.membranes.count, self.membranes.points
-        geometry = motion.geometry
-        result = np.empty((self.membranes.state_size, velocity.shape[2]))
-        gradient = geometry.column_derivative(velocity)
-        gradient *= geometry.normals.reshape(2, -1, 1)
-        np.sum(gradient, axis=0, out=result[: count * points])
+    def _means(self, velocity: Array) -> Array:
+        """Return the means over each vesicle of velocities (2, M·N, columns), (2·M, columns)."""
+        each = velocity.reshape(2 * self.membranes.count, self.membranes.points, -1)
+        return np.asarray(np.ones(self.membranes.points) @ each) / self.membranes.points
+
+    def _angle_rate_columns(self, motion: Motion, turning: Array) -> Array:
+        """Return the rates of the tangent angles for the derivatives of n · u_s by the state, in place."""
+        points = self.membranes.points
+        geometry, result = motion.geometry, turning
         curvature, highest = geometry.curvature, highest_modes(points)
         direction = tangential_speed_weights(curvature)
         speed = tangential_speed(curvature, motion.rotation_rate)
         by_curvature = tangential_speed_by_curvature(curvature, motion.rotation_rate)
-        for vesicle in range(count):
+        for vesicle in range(self.membranes.count):
             block = slice(vesicle * points, (vesicle + 1) * points)
             result[block] += np.outer(curvature[vesicle], direction[vesicle] @ result[block])
             to_curvature = self.membranes.wavenumber[vesicle] * differentiation(points)
@@ -307,5 +330,4 @@ class DenseEquation:
             result[block] -= highest @ (highest.T @ result[block])
             if self.restoring:
                 result[block, block] += self.restoring.jacobian(geometry, vesicle)
-        result[count * points :] = velocity.reshape(2 * count, points, -1).mean(axis=1)
         return result

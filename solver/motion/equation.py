@@ -138,7 +138,7 @@ class EquationOfMotion(Protocol):
     evaluations : int
         How often velocity, tension and forces were computed for `rate` and `jacobian`.
     recordings : int
-        How often they were computed for `motion`.
+        How often they were computed for `motion`, because no step had done so.
     """
 
     evaluations: int
@@ -166,6 +166,8 @@ class EquationOfMotion(Protocol):
 
     def motion(self, state: Array) -> Motion:
         """Compute velocity, tension and forces in a state, without any effect on later calls.
+
+        In a state that a step has just evaluated they are known.
 
         Parameters
         ----------

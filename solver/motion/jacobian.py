@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import lu_factor, lu_solve
+from scipy.linalg import lapack
 
 if TYPE_CHECKING:
     from solver.parallel import Shares
@@ -95,9 +95,11 @@ class DenseJacobian:
         callable
             From a right-hand side (n,) to the solution (n,).
         """
-        system = np.eye(len(self.matrix)) - duration * self.matrix
-        factors = lu_factor(system, overwrite_a=True, check_finite=False)
-        return lambda right: np.asarray(lu_solve(factors, right, check_finite=False))
+        system = -duration * self.matrix
+        system.flat[:: len(system) + 1] += 1
+        # The factors are of the transposed matrix: LAPACK counts rows and columns the other way.
+        factors, pivots, _ = lapack.dgetrf(system.T, overwrite_a=1)
+        return lambda right: np.asarray(lapack.dgetrs(factors, pivots, right, trans=1)[0])
 
 
 @dataclass(frozen=True)

@@ -141,14 +141,22 @@ def gap(geometry: Geometry, refinement: int = 4) -> float:
     membranes = geometry.membranes
     if membranes.multiplicity == 1:
         return _gap_of_many(geometry, refinement)
+    return _gap_to_image(geometry, refinement)
+
+
+def _gap_to_image(geometry: Geometry, refinement: int) -> float:
+    """Compute `gap` of a vesicle and its image."""
+    membranes = geometry.membranes
+    spacing = membranes.curve_spacing
+    apart = pair_distances(geometry.curve_points, geometry.curve_tangents, spacing, 1)[0, 1]
+    # Points that are interpolated are at most half a spacing from one that is not.
+    near = np.repeat(apart <= apart.min() + spacing[0], refinement)
     matrix = interpolation(membranes.points, refinement).T
-    apart = pair_distances(
-        geometry.curve_points @ matrix,
-        geometry.curve_tangents @ matrix,
-        membranes.curve_spacing / refinement,
-        membranes.count,
-    )
-    return float(apart.min())
+    points, tangents = geometry.points[:, 0] @ matrix, geometry.tangents[:, 0] @ matrix
+    targets = np.ascontiguousarray(points[:, np.roll(near, -(refinement // 2))])
+    gaps = np.empty(targets.shape[1])
+    distances(targets, -points, -tangents, spacing[0] / refinement, gaps)
+    return float(gaps.min())
 
 
 def _gap_of_many(geometry: Geometry, refinement: int) -> float:

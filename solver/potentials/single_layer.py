@@ -169,12 +169,12 @@ class SingleLayer:
         size = membranes.count * membranes.points
         shares = self._parallel.divide(size)
         own = shares.own
-        by_points = np.empty((2, own.stop - own.start, 2, membranes.multiplicity * size))
+        by_points = np.empty((2, own.stop - own.start, 2, size))
         curve_forces = membranes.with_images(point_forces, axis=1).reshape(2, -1)
         stokeslets.stokeslet_derivatives(
             geometry.curve_points.reshape(2, -1), curve_forces, by_points, own.start
         )
-        by_state = shares.gather(geometry.by_state(membranes.fold(by_points)), axis=1)
+        by_state = shares.gather(geometry.by_state(by_points), axis=1)
         forces = point_forces.reshape(2, -1)
         # On the diagonal r⊗r/r² is t⊗t, which rotates with the tangent.
         tangents, normals = geometry.tangents.reshape(2, -1), geometry.normals.reshape(2, -1)

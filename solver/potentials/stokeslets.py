@@ -102,39 +102,58 @@ def join_components(components: Array, matrix: Array) -> None:
 
 @compiled
 def stokeslet_derivatives(points: Array, forces: Array, by_points: Array, first: int) -> None:
-    """Fill the derivatives of the velocity at some points by the positions of all of them.
+    """Fill the derivatives of the velocity at some points by the positions of the vesicles' points.
 
     The velocity is the sum of Stokeslets at the points.  With r = x − y, the strength F and g = F·r, moving
     r by δ changes one of them by [−F (r·δ) + r (F·δ) + g δ − 2 g r (r·δ)/r²]/(4π r²).
 
     Parameters
     ----------
-    points : (2, n)
-    forces : (2, n)
+    points : (2, n) or (2, 2n)
+        Of the vesicles, and then of their images if there are any, which move the opposite way.
+    forces : as points
         Strengths.
     by_points : (2, m, 2, n)
         Written to.
     first : int
         Number of the first of the m points.
     """
+    widest_vectors()
     scale = 1.0 / (4.0 * np.pi)
+    n = by_points.shape[3]
+    by_points[:] = 0.0
     for i in range(by_points.shape[1]):
         xi, yi = points[0, first + i], points[1, first + i]
-        for j in range(points.shape[1]):
-            dx = xi - points[0, j]
-            dy = yi - points[1, j]
-            fx, fy = forces[0, j], forces[1, j]
-            r2 = dx * dx + dy * dy
-            inverse = scale / (r2 if r2 > 0.0 else np.inf)
-            along = dx * fx + dy * fy
-            pull = 2.0 * along * inverse * inverse * (1.0 / scale)
-            by_points[0, i, 0, j] = -along * inverse + pull * dx * dx
-            by_points[0, i, 1, j] = (fx * dy - dx * fy) * inverse + pull * dx * dy
-            by_points[1, i, 0, j] = (fy * dx - dy * fx) * inverse + pull * dx * dy
-            by_points[1, i, 1, j] = -along * inverse + pull * dy * dy
-        for component in range(2):
-            for coordinate in range(2):
-                by_points[component, i, coordinate, first + i] -= by_points[component, i, coordinate].sum()
+        # As rows: indexed in four dimensions the loop is not turned into SIMD code.
+        xx, xy, yx, yy = by_points[0, i, 0], by_points[0, i, 1], by_points[1, i, 0], by_points[1, i, 1]
+        sum_xx = sum_xy = sum_yx = sum_yy = 0.0
+        for begin in range(0, points.shape[1], n):
+            sign = 1.0 if begin == 0 else -1.0
+            source_x, source_y = points[0, begin : begin + n], points[1, begin : begin + n]
+            force_x, force_y = forces[0, begin : begin + n], forces[1, begin : begin + n]
+            for j in range(n):
+                dx = xi - source_x[j]
+                dy = yi - source_y[j]
+                fx, fy = force_x[j], force_y[j]
+                r2 = dx * dx + dy * dy
+                inverse = scale / r2 if r2 > 0.0 else 0.0
+                along = (dx * fx + dy * fy) * inverse
+                across = (fx * dy - dx * fy) * inverse
+                pull = 2.0 * along * inverse * (1.0 / scale)
+                of_xx, of_yy = pull * dx * dx - along, pull * dy * dy - along
+                of_xy, of_yx = pull * dx * dy + across, pull * dx * dy - across
+                xx[j] += sign * of_xx
+                xy[j] += sign * of_xy
+                yx[j] += sign * of_yx
+                yy[j] += sign * of_yy
+                sum_xx += of_xx
+                sum_xy += of_xy
+                sum_yx += of_yx
+                sum_yy += of_yy
+        xx[first + i] -= sum_xx
+        xy[first + i] -= sum_xy
+        yx[first + i] -= sum_yx
+        yy[first + i] -= sum_yy
 
 
 @compiled
