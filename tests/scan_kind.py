@@ -60,7 +60,7 @@ class ScanQuestion(Question[Scan]):
             run_batch(communicator, scenes, opened, on_change, ranks_per_run)
             if communicator.Get_rank() != 0:
                 return None
-            outcomes = [str(whole_store(opened).outcome(run_key(scene))) for scene in scenes]
+            outcomes = [str(whole_store(opened).summary(run_key(scene)).outcome) for scene in scenes]
         return ScanAnswer(dict(zip(self.document.values, outcomes, strict=True)))
 
     @classmethod

@@ -17,7 +17,7 @@ import { describe, quantity, valueAt } from "./symbols.js";
  */
 
 const SECONDS_BETWEEN_REQUESTS = 0.5;
-const SEARCHING = "searching";
+const OPEN = ["searching", "confirming", "certifying"]; // more runs are needed
 const CONVERGED = "converged";
 
 /**
@@ -197,16 +197,18 @@ function scannedText({ scanned }) {
 
 /** @param {Point} point */
 function stateOf({ status }) {
-  const states = /** @type {Record<string, string>} */ ({ [SEARCHING]: "live", [CONVERGED]: "done" });
-  return states[status] ?? "bad";
+  if (OPEN.includes(status)) {
+    return "live";
+  }
+  return status === CONVERGED ? "done" : "bad";
 }
 
 /** @param {Point[]} points */
 function stateOfAll(points) {
-  const count = (/** @type {string} */ status) => points.filter((point) => point.status === status).length;
-  const [searching, converged] = [count(SEARCHING), count(CONVERGED)];
-  if (searching > 0) {
-    return { name: "live", text: `tracing, ${searching} of ${points.length} open` };
+  const open = points.filter(({ status }) => OPEN.includes(status)).length;
+  const converged = points.filter(({ status }) => status === CONVERGED).length;
+  if (open > 0) {
+    return { name: "live", text: `tracing, ${open} of ${points.length} open` };
   }
   return converged === points.length
     ? { name: "done", text: "complete" }

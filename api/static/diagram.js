@@ -21,6 +21,7 @@ import { color } from "./theme.js";
  * @property {string} status
  * @property {{bracket: [number, number], outcomes: [string, string]}[]} changes - All that were found.
  * @property {{values: number, looked_at: number[], widest_unseen: number} | null} scanned
+ * @property {{value: number, outcome: string, finer_outcome: string}[]} confirmed - Sensitive ends, run again.
  * @property {boolean} certified
  * @property {string[]} runs
  *

@@ -28,8 +28,9 @@ def boundary_columns(points: Sequence[BoundaryPoint]) -> list[str]:
     list of str
     """
     others = ["other changes"] if any(point.other_changes for point in points) else []
-    headings = ["critical value", "bracket", "outcomes", "status", *others, "scanned", "certified by", "runs"]
-    return [*points[0].parameters, *headings]
+    confirmed = ["confirmed"] if any(point.confirmed for point in points) else []
+    headings = ["critical value", "bracket", "outcomes", "status", *others, "scanned", *confirmed]
+    return [*points[0].parameters, *headings, "certified by", "runs"]
 
 
 def boundary_cells(point: BoundaryPoint, columns: Sequence[str]) -> list[str]:
@@ -53,6 +54,7 @@ def boundary_cells(point: BoundaryPoint, columns: Sequence[str]) -> list[str]:
         "status": point.status,
         "other changes": "; ".join(map(_change, point.other_changes)) or _ABSENT,
         "scanned": _scanned(point),
+        "confirmed": _confirmed(point),
         "certified by": _certifying_numerics(point),
         "runs": str(len(point.runs)),
     }
@@ -83,6 +85,12 @@ def _scanned(point: BoundaryPoint) -> str:
     """Say how many values were looked at beside the brackets, and how wide an unseen window may be."""
     scanned = point.scanned
     return _ABSENT if scanned is None else f"{scanned.values} values, unseen ≤ ×{scanned.widest_unseen:.3g}"
+
+
+def _confirmed(point: BoundaryPoint) -> str:
+    """Say how many of the sensitive runs came out the same at finer numerics."""
+    agreeing = sum(each.outcome == each.finer_outcome for each in point.confirmed)
+    return f"{agreeing} of {len(point.confirmed)}" if point.confirmed else _ABSENT
 
 
 def _certifying_numerics(point: BoundaryPoint) -> str:

@@ -21,14 +21,13 @@ from typing import TYPE_CHECKING, Any, Generic, cast
 from ensemble.mpi.groups import Groups
 from ensemble.mpi.usage import RunUsage, UsageMeter
 from ensemble.mpi.world import abort_guard
-from ensemble.search.task_queue import SomeTask, Task, TaskQueue
+from ensemble.search.task_queue import RunAnswer, SomeTask, Task, TaskQueue
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
 
     from ensemble.mpi.store_on_ranks import StoreOnRank
     from ensemble.store import Staged, Store
-    from solver.analysis.run import Outcome
 
 _ORDERS = 1  # tag of messages to workers
 _REPORTS = 2  # tag of messages to the dispatcher
@@ -68,14 +67,14 @@ class Finished:
     ----------
     staged : Staged
         To be committed by the dispatcher.
-    outcome : Outcome
+    answer : RunAnswer
         Of the run.
     seconds : float
         That it took to simulate.
     """
 
     staged: Staged
-    outcome: Outcome
+    answer: RunAnswer
     seconds: float
 
 
@@ -178,7 +177,7 @@ def _simulate(groups: Groups, leaders: Intracomm, store: StoreOnRank, task: Task
     except Cancelled:
         return Stopped(time.perf_counter() - begin)
     seconds = time.perf_counter() - begin
-    return Finished(store.stage(run), run.outcome, seconds)
+    return Finished(store.stage(run), RunAnswer(run.outcome, run.sensitive), seconds)
 
 
 class _Cancellation:
@@ -276,10 +275,10 @@ class Dispatcher(Generic[SomeTask]):
 
     def _take(self, report: WorkerReport, rank: int) -> None:
         match report:
-            case Finished(staged, outcome, seconds):
+            case Finished(staged, answer, seconds):
                 task = self._end(rank)
                 self._store.commit(staged)
-                self._queue.answer(task, outcome)
+                self._queue.answer(task, answer)
                 self._runs += 1
                 self._meter.record_run(rank, seconds)
             case Stopped(seconds):

@@ -93,7 +93,7 @@ def run_study(
 
     def begin() -> StudyPlanner:
         kept = whole_store(store)
-        return StudyPlanner(study, kept.outcome, (summary.scene for summary in kept.summaries()))
+        return StudyPlanner(study, kept.answer, (summary.scene for summary in kept.summaries()))
 
     def publish(planner: StudyPlanner, progress: JobProgress[SearchRun]) -> None:
         boundary = planner.boundary()
@@ -137,7 +137,7 @@ def run_batch(
         communicator,
         ranks_per_run,
         store,
-        begin=lambda: Batch(scenes, whole_store(store).outcome),
+        begin=lambda: Batch(scenes, whole_store(store).answer),
         publish=lambda batch, progress: on_change(progress),
         conclude=lambda batch: None,
     )

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 
 from ensemble.config.run_key import run_key
-from ensemble.search.task_queue import Task
-from solver.analysis.run import Outcome
+from ensemble.search.task_queue import RunAnswer, Task
 from solver.scene import Scene
 
 _AUTOMATIC_POINTS = 64  # what a scene that leaves the number to the solver usually comes to
@@ -20,11 +19,11 @@ class Batch:
     scenes : iterable of Scene
         Equal ones are run once.
     known : callable
-        Returns the outcome of the run with a key if it has been made before, else None.  A run that has been
+        Returns the answer of the run with a key if it has been made before, else None.  A run that has been
         made before is never a task.
     """
 
-    def __init__(self, scenes: Iterable[Scene], known: Callable[[str], Outcome | None]) -> None:
+    def __init__(self, scenes: Iterable[Scene], known: Callable[[str], RunAnswer | None]) -> None:
         tasks = {key: Task(scene=scene, key=key) for scene in scenes for key in [run_key(scene)]}
         self._waiting = sorted(
             (task for task in tasks.values() if known(task.key) is None),
@@ -41,14 +40,14 @@ class Batch:
         self._running.add(task.key)
         return task
 
-    def answer(self, task: Task, outcome: Outcome) -> None:
+    def answer(self, task: Task, answer: RunAnswer) -> None:
         """Take note that a run has been made, whatever its outcome is: a numerical failure counts too.
 
         Parameters
         ----------
         task : Task
             A task that is handed out.
-        outcome : Outcome
+        answer : RunAnswer
             Of its run.
         """
         self._running.remove(task.key)

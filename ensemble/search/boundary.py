@@ -36,6 +36,26 @@ class OutcomeChange(BaseModel):
     outcomes: tuple[str, str]
 
 
+class Confirmed(BaseModel):
+    """A value whose run was sensitive and has been made again at finer numerics, whose outcome counts.
+
+    Attributes
+    ----------
+    value : float
+        Of the searched parameter.
+    outcome : str
+        Of the first run.
+    finer_outcome : str
+        Of the run at finer numerics.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    value: float
+    outcome: str
+    finer_outcome: str
+
+
 class Scanned(BaseModel):
     """How far a search has looked beside the brackets that it has found.
 
@@ -77,6 +97,9 @@ class BoundaryPoint(BaseModel):
         where there are several, the others.
     scanned : Scanned or None
         How far the search has looked beside them; None until it has, or if it does not.
+    confirmed : list of Confirmed
+        The ends of brackets whose runs were sensitive, ascending; those of earlier brackets, too, which an
+        end has left because its finer run came out otherwise.
     certified : bool
         Whether both ends were run again at finer numerics and came out on the same sides.
     certified_by : Numerics or None
@@ -94,6 +117,7 @@ class BoundaryPoint(BaseModel):
     status: str
     changes: list[OutcomeChange] = []
     scanned: Scanned | None = None
+    confirmed: list[Confirmed] = []
     certified: bool
     certified_by: Numerics | None = None
     runs: list[str]

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import copy
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import pairwise
@@ -177,6 +178,30 @@ class GridSearch:
         if known is not side:
             raise ValueError(f"{value!r} cannot be {side}: it is known to be {known}")
         self._pending.discard(index)
+
+    def side_at(self, value: float) -> Side:
+        """Return the side on which a value lies.
+
+        Parameters
+        ----------
+        value : float
+            Whose answer is known.
+
+        Returns
+        -------
+        Side
+        """
+        return self._sides[self._index(value)]
+
+    def revise(self, sides: Mapping[float, Side]) -> None:
+        """Take better answers for values that are known, in place of the former ones.
+
+        Parameters
+        ----------
+        sides : mapping from float to Side
+            By value.
+        """
+        self._sides |= {self._index(value): side for value, side in sides.items()}
 
     def withdraw(self, value: float) -> None:
         """Give back a pending value whose run was cancelled or lost; it may be asked for again.
@@ -339,6 +364,11 @@ class CriticalValueSearch(GridSearch):
         """How many more answers are needed if each halves the bracket; 0 once done."""
         low, high = self.ends()
         return 0.0 if self.done else max(1.0, math.log2(high - low))
+
+    @property
+    def ends_of_changes(self) -> frozenset[float]:
+        """The ends of the bracket that are known."""
+        return frozenset(end for end in self.bracket if end is not None)
 
     @property
     def changes(self) -> tuple[tuple[float, float], ...]:

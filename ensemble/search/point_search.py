@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 from ensemble.config.run_key import run_key
 from ensemble.search.critical_value import Side
-from ensemble.search.task_queue import Task
+from ensemble.search.task_queue import RunAnswer, Task
 from solver.analysis.run import Outcome
 from solver.scene import Scene
 
@@ -31,7 +31,7 @@ class SearchRun(Task):
 
 @dataclass(frozen=True)
 class _KnownRun:
-    outcome: Outcome
+    answer: RunAnswer
     key: str
 
 
@@ -86,7 +86,7 @@ class PointSearch(Generic[SomeValueSearch]):
     side : callable
         Returns the side of an outcome.
     known : callable
-        Returns the outcome of the run with a key if it has been made before, else None.  A run that has been
+        Returns the answer of the run with a key if it has been made before, else None.  A run that has been
         made before is never a task.
     """
 
@@ -96,7 +96,7 @@ class PointSearch(Generic[SomeValueSearch]):
         sweep_value: float,
         scene_at: Callable[[float], Scene],
         side: Callable[[Outcome], Side],
-        known: Callable[[str], Outcome | None],
+        known: Callable[[str], RunAnswer | None],
     ) -> None:
         self.search = search
         self.sweep_value = sweep_value
@@ -135,8 +135,46 @@ class PointSearch(Generic[SomeValueSearch]):
         (str or None, str or None)
             None for an end that is unknown.
         """
-        low, high = (None if end is None else self._answers[end].outcome for end in bracket)
+        low, high = (None if end is None else self.outcome(end) for end in bracket)
         return low, high
+
+    def outcome(self, value: float) -> Outcome:
+        """Return the outcome at a value.
+
+        Parameters
+        ----------
+        value : float
+            Whose answer is known.
+
+        Returns
+        -------
+        Outcome
+        """
+        return self._answers[value].answer.outcome
+
+    def is_sensitive(self, value: float) -> bool:
+        """Return whether the outcome at a value could be another one.
+
+        Parameters
+        ----------
+        value : float
+            Whose answer is known.
+
+        Returns
+        -------
+        bool
+        """
+        return self._answers[value].answer.sensitive
+
+    def adopt(self, other: PointSearch[Any]) -> None:
+        """Take the answers that another search has got from runs at the same numerics.
+
+        Parameters
+        ----------
+        other : PointSearch
+        """
+        for value, run in other._answers.items():
+            self._take(self._task(value), run.answer)
 
     def unneeded_tasks(self) -> tuple[SearchRun, ...]:
         """Return the tasks that are handed out and whose outcome is no longer needed."""
@@ -174,18 +212,18 @@ class PointSearch(Generic[SomeValueSearch]):
         for task in tuple(self._pending.values()):
             self.cancelled(task)
 
-    def answer(self, task: SearchRun, outcome: Outcome) -> None:
-        """Take the outcome of a task's run.
+    def answer(self, task: SearchRun, answer: RunAnswer) -> None:
+        """Take the answer of a task's run.
 
         Parameters
         ----------
         task : SearchRun
             A task that is handed out.
-        outcome : Outcome
+        answer : RunAnswer
             Of its run.
         """
         del self._pending[task.value]
-        self._take(task, outcome)
+        self._take(task, answer)
 
     def cancelled(self, task: SearchRun) -> None:
         """Take back a task whose run was cancelled.
@@ -203,13 +241,13 @@ class PointSearch(Generic[SomeValueSearch]):
         return SearchRun(sweep_value=self.sweep_value, value=value, scene=scene, key=run_key(scene))
 
     def _take_known(self, task: SearchRun) -> bool:
-        outcome = self._known(task.key)
-        if outcome is None:
+        answer = self._known(task.key)
+        if answer is None:
             return False
-        self._take(task, outcome)
+        self._take(task, answer)
         self.known_answers += 1
         return True
 
-    def _take(self, task: SearchRun, outcome: Outcome) -> None:
-        self.search.tell(task.value, self._side(outcome))
-        self._answers[task.value] = _KnownRun(outcome, task.key)
+    def _take(self, task: SearchRun, answer: RunAnswer) -> None:
+        self.search.tell(task.value, self._side(answer.outcome))
+        self._answers[task.value] = _KnownRun(answer, task.key)

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import chain, pairwise
 
 from ensemble.config.geometric_grid import GeometricGrid
@@ -122,6 +122,10 @@ class ScanningSearch(GridSearch):
         self._center = (self._indices[0] + self._indices[-1]) / 2
         if guess is not None:
             self.replace_guess(guess)
+        self._begin()
+
+    def _begin(self) -> None:
+        """Begin with the lattice, and go on as far as the known answers allow."""
         # What the answer rests on, also beyond the limits; the awaited values have no answer yet.
         self._looked_at = set(self._lattice())
         self._awaited = {index for index in self._looked_at if index in self._indices}
@@ -161,6 +165,17 @@ class ScanningSearch(GridSearch):
         """
         super().tell(value, side)
         self._advance()
+
+    def revise(self, sides: Mapping[float, Side]) -> None:
+        """Take better answers for values that are known, and come to what follows from them.
+
+        Parameters
+        ----------
+        sides : mapping from float to Side
+            By value.
+        """
+        super().revise(sides)
+        self._begin()
 
     def replace_guess(self, guess: tuple[float, float]) -> None:
         """Replace the guess.
@@ -229,6 +244,12 @@ class ScanningSearch(GridSearch):
             for low, high in (self._changes() if self.done else ())
             if low in self._indices and high in self._indices
         )
+
+    @property
+    def ends_of_changes(self) -> frozenset[float]:
+        """The ends, within the limits, of all changes that the answer rests on."""
+        ends = {end for change in self._differing(self._looked_at) for end in change}
+        return frozenset(self._grid.value(index) for index in ends if index in self._indices)
 
     @property
     def looked_at(self) -> tuple[float, ...]:

@@ -16,15 +16,15 @@ from ensemble.search.boundary import Boundary, BoundaryPoint
 from ensemble.search.point_search import SearchRun
 from ensemble.search.study_point import StudyPoint
 from ensemble.search.study_search import expected_bracket
+from ensemble.search.task_queue import RunAnswer
 from ensemble.timestamp import now
-from solver.analysis.run import Outcome
 from solver.scene import Scene
 
 _NEIGHBORS = 2  # on either side, from which a bracket is expected
 
 
 class StudyPlanner:
-    """The task queue of a study: all of its searches and the certifications of their brackets.
+    """The task queue of a study: all of its searches, confirmations and certifications.
 
     Points are worked on in the order of the sweep, one task each before any gets a second one: two workers
     get further on two searches than on one, and finished searches show the later ones where to begin.  When
@@ -36,14 +36,14 @@ class StudyPlanner:
     study : Study
         What is to be traced.
     known : callable
-        Returns the outcome of the run with a key if it has been made before, else None.  A run that has been
+        Returns the answer of the run with a key if it has been made before, else None.  A run that has been
         made before is never a task.
     made : iterable of Scene
         Scenes of runs made before.  Those that belong to this study are answers from the start.
     """
 
     def __init__(
-        self, study: Study, known: Callable[[str], Outcome | None], made: Iterable[Scene] = ()
+        self, study: Study, known: Callable[[str], RunAnswer | None], made: Iterable[Scene] = ()
     ) -> None:
         self._study = study
         self._grid = study.search.grid
@@ -79,17 +79,17 @@ class StudyPlanner:
                 return task
         return None
 
-    def answer(self, task: SearchRun, outcome: Outcome) -> None:
+    def answer(self, task: SearchRun, answer: RunAnswer) -> None:
         """See `TaskQueue`.
 
         Parameters
         ----------
         task : SearchRun
             A task that is handed out.
-        outcome : Outcome
+        answer : RunAnswer
             Of its run.
         """
-        self._points[task.sweep_value].answer(task, outcome)
+        self._points[task.sweep_value].answer(task, answer)
         self._look_at(task.sweep_value)
 
     def cancelled(self, task: SearchRun) -> None:
@@ -109,7 +109,7 @@ class StudyPlanner:
 
     @property
     def done(self) -> bool:
-        """Whether no search and no certification needs a further answer."""
+        """Whether no point needs a further answer."""
         return not self._open
 
     @property

@@ -1,25 +1,33 @@
-"""One point of a study's boundary: its search and, once that has converged, its certification."""
+"""One point of a study's boundary: its search, the confirmation of its ends, and its certification."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 from ensemble.config.certifying_scene import certifying_scene
 from ensemble.config.study import Study
-from ensemble.search.boundary import BoundaryPoint, OutcomeChange, Scanned
+from ensemble.search.boundary import BoundaryPoint, Confirmed, OutcomeChange, Scanned
 from ensemble.search.certification import Certification, CertificationResult
+from ensemble.search.confirmation import CONFIRMING, Confirmation
 from ensemble.search.critical_value import SearchStatus
-from ensemble.search.point_search import PointSearch, SearchRun
+from ensemble.search.point_search import PointSearch, SearchRun, SomeValueSearch
 from ensemble.search.scanning_search import ScanningSearch
 from ensemble.search.study_search import BracketSearch, certification_of, critical_value_search, side_of
+from ensemble.search.task_queue import RunAnswer
 from solver.analysis.run import Outcome
+from solver.scene import Scene
 
 ENDS = 2  # of a bracket, hence runs of a certification that finds both where they were
 
 
 class StudyPoint:
-    """The search at one value of a sweep, and the certification of its bracket.
+    """The search at one value of a sweep, with the confirmation and the certification of its bracket.
+
+    When the search is done, the ends of brackets whose runs are sensitive are run again at finer numerics.
+    When all of them are known, those that came out otherwise replace the former answers, and the search goes
+    on from there.  So what it comes to follows from outcomes alone, not from their order.
 
     Parameters
     ----------
@@ -28,11 +36,11 @@ class StudyPoint:
     sweep_value : float
         Of the swept parameter.
     known : callable
-        Returns the outcome of the run with a key if it has been made before, else None.  A run that has been
+        Returns the answer of the run with a key if it has been made before, else None.  A run that has been
         made before is never a task.
     """
 
-    def __init__(self, study: Study, sweep_value: float, known: Callable[[str], Outcome | None]) -> None:
+    def __init__(self, study: Study, sweep_value: float, known: Callable[[str], RunAnswer | None]) -> None:
         self._study = study
         self._sweep_value = sweep_value
         self._known = known
@@ -43,6 +51,7 @@ class StudyPoint:
             partial(side_of, study),
             known,
         )
+        self._confirmation = self._at_finer_numerics(Confirmation())
         self._certification: PointSearch[Certification] | None = None
 
     @property
@@ -69,6 +78,7 @@ class StudyPoint:
             That the search may try.
         """
         self._search.take_known(value)
+        self._confirm()
 
     def next_task(self) -> SearchRun | None:
         """Return the task of the most useful value to try; None if there is none."""
@@ -77,20 +87,24 @@ class StudyPoint:
                 return task
             if not self._search.search.done:
                 return None
+            self._confirm()
+        if not self._confirmation.search.done:
+            return self._confirmation.next_task()
         certification = self._certifying()
         return None if certification is None else certification.next_task()
 
-    def answer(self, task: SearchRun, outcome: Outcome) -> None:
-        """Take the outcome of a task's run.
+    def answer(self, task: SearchRun, answer: RunAnswer) -> None:
+        """Take the answer of a task's run.
 
         Parameters
         ----------
         task : SearchRun
             A task that is handed out.
-        outcome : Outcome
+        answer : RunAnswer
             Of its run.
         """
-        self._owner(task).answer(task, outcome)
+        self._owner(task).answer(task, answer)
+        self._confirm()
 
     def cancelled(self, task: SearchRun) -> None:
         """Take back a task whose run was cancelled.
@@ -116,20 +130,20 @@ class StudyPoint:
     def done(self) -> bool:
         """Whether no further answer is needed."""
         certification = self._certifying()
-        return self._search.search.done and (certification is None or certification.search.done)
+        return self._is_confirmed and (certification is None or certification.search.done)
 
     @property
     def pending(self) -> int:
         """How many tasks are handed out."""
         certifying = 0 if self._certification is None else len(self._certification.pending)
-        return len(self._search.pending) + certifying
+        return len(self._search.pending) + len(self._confirmation.pending) + certifying
 
     @property
     def urgency(self) -> tuple[bool, bool, int]:
         """How useful the next task is compared with those of other points: the least comes first.
 
         Runs that are needed in any case come first, among them those of points without a task, and then
-        those of certifications.
+        those at finer numerics.
 
         Returns
         -------
@@ -143,21 +157,24 @@ class StudyPoint:
     def known_answers(self) -> int:
         """How many outcomes come from runs made before."""
         certified = 0 if self._certification is None else self._certification.known_answers
-        return self._search.known_answers + certified
+        return self._search.known_answers + self._confirmation.known_answers + certified
 
     @property
     def runs_left(self) -> float:
         """How many more answers are expected to be needed."""
-        if not self._search.search.done:
-            return self._search.search.answers_left + (ENDS if self._study.search.certify else 0)
+        if not self._is_confirmed:
+            finer = self._confirmation.search.values_left + (ENDS if self._study.search.certify else 0)
+            return self._search.search.answers_left + finer
         certification = self._certifying()
         return 0 if certification is None else certification.search.ends_left
 
     def boundary_point(self) -> BoundaryPoint:
         """Return the point as far as it is known."""
         search, certification = self._search.search, self._certifying()
-        bracket, status, runs = search.bracket, str(search.status), self._search.runs
-        outcomes, certified_by = self._search.outcomes(bracket), None
+        confirming = search.done and not self._is_confirmed
+        bracket, status = search.bracket, CONFIRMING if confirming else str(search.status)
+        outcomes, certified_by = self._outcomes(bracket), None
+        runs = self._search.runs + self._confirmation.runs
         if certification is not None:
             result, ends = certification.search.result, certification.search.bracket
             status, runs = str(result), runs + certification.runs
@@ -171,20 +188,29 @@ class StudyPoint:
             outcomes=outcomes,
             status=status,
             changes=[
-                OutcomeChange.model_validate({"bracket": change, "outcomes": self._search.outcomes(change)})
+                OutcomeChange.model_validate({"bracket": change, "outcomes": self._outcomes(change)})
                 for change in search.changes
             ],
             scanned=_scanned(search),
+            confirmed=[
+                Confirmed(
+                    value=value,
+                    outcome=self._search.outcome(value),
+                    finer_outcome=self._confirmation.outcome(value),
+                )
+                for value in sorted(self._confirmation.search.sides)
+            ],
             certified=certified_by is not None,
             certified_by=certified_by,
-            runs=runs,
+            runs=list(dict.fromkeys(runs)),  # one that has confirmed an end may certify it, too
         )
 
     @property
     def converged_bracket(self) -> tuple[float, float] | None:
-        """The bracket of the search, if it has converged."""
+        """The bracket of the search, if it has converged and its ends are confirmed."""
         search = self._search.search
-        low, high = search.bracket if search.status is SearchStatus.CONVERGED else (None, None)
+        converged = search.status is SearchStatus.CONVERGED and self._is_confirmed
+        low, high = search.bracket if converged else (None, None)
         return None if low is None or high is None else (low, high)
 
     def _certifying(self) -> PointSearch[Certification] | None:
@@ -193,21 +219,58 @@ class StudyPoint:
         if bracket is None:
             return None
         if self._certification is None:
-            self._certification = PointSearch(
-                certification_of(self._study, bracket),
-                self._sweep_value,
-                lambda value: certifying_scene(self._study.scene_at(self._sweep_value, value)),
-                partial(side_of, self._study),
-                self._known,
-            )
+            self._certification = self._at_finer_numerics(certification_of(self._study, bracket))
+            self._certification.adopt(self._confirmation)
             self._certification.take_all_known()
         return self._certification
 
-    def _owner(self, task: SearchRun) -> PointSearch[BracketSearch] | PointSearch[Certification]:
-        certification = self._certification
-        if certification is not None and certification.pending.get(task.value) == task:
-            return certification
-        return self._search
+    @property
+    def _is_confirmed(self) -> bool:
+        """Whether the search is done, and its sensitive ends have come out the same at finer numerics."""
+        return self._search.search.done and self._confirmation.search.done
+
+    def _confirm(self) -> None:
+        """See to it that the sensitive ends are confirmed; go on where finer runs came out otherwise."""
+        search, confirmation = self._search.search, self._confirmation.search
+        while search.done:
+            sensitive = filter(self._search.is_sensitive, search.ends_of_changes - confirmation.values)
+            for value in filter(self._can_be_finer, sensitive):
+                confirmation.add(value)
+                self._confirmation.take_known(value)
+            contrary = {
+                value: side for value, side in confirmation.sides.items() if side is not search.side_at(value)
+            }
+            if not (contrary and confirmation.done):
+                return
+            search.revise(contrary)
+
+    def _can_be_finer(self, value: float) -> bool:
+        """Return whether there are finer numerics than those of the run at a value."""
+        try:
+            self._finer_scene(value)
+        except ValueError:
+            return False
+        return True
+
+    def _finer_scene(self, value: float) -> Scene:
+        return certifying_scene(self._study.scene_at(self._sweep_value, value))
+
+    def _at_finer_numerics(self, search: SomeValueSearch) -> PointSearch[SomeValueSearch]:
+        side = partial(side_of, self._study)
+        return PointSearch(search, self._sweep_value, self._finer_scene, side, self._known)
+
+    def _outcomes(self, ends: tuple[float | None, float | None]) -> tuple[str | None, str | None]:
+        """Return the outcomes that count at two values; None for an end that is unknown."""
+        low, high = (None if end is None else self._outcome(end) for end in ends)
+        return low, high
+
+    def _outcome(self, value: float) -> Outcome:
+        is_finer = value in self._confirmation.search.sides
+        return (self._confirmation if is_finer else self._search).outcome(value)
+
+    def _owner(self, task: SearchRun) -> PointSearch[Any]:
+        finer = (self._certification, self._confirmation)
+        return next((s for s in finer if s is not None and s.pending.get(task.value) == task), self._search)
 
 
 def _scanned(search: BracketSearch) -> Scanned | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
+from typing import NamedTuple, Protocol, TypeVar
 
 from solver.analysis.run import Outcome
 from solver.scene import Scene
@@ -28,20 +28,34 @@ class Task:
 SomeTask = TypeVar("SomeTask", bound=Task)
 
 
+class RunAnswer(NamedTuple):
+    """What a run has come to.
+
+    Attributes
+    ----------
+    outcome : Outcome
+    sensitive : bool
+        Whether the error of the run could have made it another one.
+    """
+
+    outcome: Outcome
+    sensitive: bool = False
+
+
 class TaskQueue(Protocol[SomeTask]):
-    """Hands out tasks to idle workers and takes the outcomes of their runs, in any order."""
+    """Hands out tasks to idle workers and takes the answers of their runs, in any order."""
 
     def next_task(self) -> SomeTask | None:
         """Return the most useful task for an idle worker; None if every useful one is handed out already."""
 
-    def answer(self, task: SomeTask, outcome: Outcome) -> None:
-        """Take the outcome of a task's run.
+    def answer(self, task: SomeTask, answer: RunAnswer) -> None:
+        """Take the answer of a task's run.
 
         Parameters
         ----------
         task : Task
             A task that is handed out.
-        outcome : Outcome
+        answer : RunAnswer
             Of its run.
         """
 

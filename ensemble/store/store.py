@@ -23,6 +23,7 @@ from sqlalchemy.exc import DatabaseError
 from ensemble.disk import flush, locked, require_space
 from ensemble.errors import FULL, NotStored, OtherVersionError, StoreError, StoreInputError
 from ensemble.search.boundary import Boundary
+from ensemble.search.task_queue import RunAnswer
 from ensemble.store.catalog import Catalog, Record
 from ensemble.store.recovery import Recovery
 from ensemble.store.run_record import RunSummary, first_problem
@@ -353,8 +354,8 @@ class Store(AbstractContextManager["Store"]):
             raise StoreInputError(f"run: {beginning} is the beginning of several keys: {', '.join(keys)}")
         return keys[0]
 
-    def outcome(self, key: str) -> Outcome | None:
-        """Return the outcome of a committed run.
+    def answer(self, key: str) -> RunAnswer | None:
+        """Return what a committed run has come to.
 
         Parameters
         ----------
@@ -362,11 +363,15 @@ class Store(AbstractContextManager["Store"]):
 
         Returns
         -------
-        Outcome or None
+        RunAnswer or None
             None if there is no such run.
         """
         record = self._catalog.run(key)
-        return None if record is None else Outcome(json.loads(record.json)["outcome"])
+        if record is None:
+            return None
+        document = json.loads(record.json)
+        # Records from before runs followed their errors do not say whether they are sensitive.
+        return RunAnswer(Outcome(document["outcome"]), document.get("sensitive", False))
 
     def summary(self, key: str) -> RunSummary:
         """Return everything about a committed run except its arrays.

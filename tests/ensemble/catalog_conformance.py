@@ -194,14 +194,14 @@ class CatalogConformance:
     def test_a_record_is_the_json_of_its_model(self, filled: Store) -> None:
         for summary in filled.summaries():
             assert json.loads(filled.run_record(summary.key).json) == summary.document()
-            assert filled.outcome(summary.key) is summary.outcome
+            assert filled.answer(summary.key) == (summary.outcome, summary.sensitive)
 
     def test_what_is_not_there_is_said_so(self, store: Store) -> None:
         for ask in (store.summary, store.run_record, store.boundary, store.boundary_record):
             with pytest.raises(NotStored):
                 ask("nothing")
         assert not store.contains("nothing")
-        assert store.outcome("nothing") is None
+        assert store.answer("nothing") is None
 
     def test_a_store_is_opened_again_and_swept_without_losing_a_run(self, store: Store) -> None:
         key = store.save(shear_run())

@@ -92,7 +92,7 @@ def test_jobs_are_carried_out_one_after_the_other(jobs, store):
     with Store.existing(store) as opened:
         scene_done, study_done = jobs.get(scene.id), jobs.get(study.id)
         assert (scene_done.status, scene_done.message) == (JobStatus.SUCCEEDED, "bound")
-        assert opened.outcome(scene.key) == "bound"
+        assert opened.summary(scene.key).outcome == "bound"
         assert (study_done.status, study_done.message) == (JobStatus.SUCCEEDED, "2 of 2 points converged")
         (boundary,) = [found for found in opened.boundaries() if found.study_key == study.key]
         assert {point.status for point in boundary.points} == {"converged"}

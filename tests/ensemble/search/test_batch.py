@@ -9,6 +9,7 @@ from pathlib import Path
 from ensemble.config.documents import load_scene
 from ensemble.config.run_key import run_key
 from ensemble.search.batch import Batch, expected_work
+from ensemble.search.task_queue import RunAnswer
 from ensemble.store import Store
 from solver.analysis.run import Outcome
 
@@ -37,7 +38,7 @@ def test_a_start_that_is_relaxed_first_is_work_too() -> None:
 
 
 def test_equal_scenes_are_run_once_and_known_ones_never() -> None:
-    known = {run_key(SCENES[0]): Outcome.STEADY}
+    known = {run_key(SCENES[0]): RunAnswer(Outcome.STEADY)}
     batch = Batch([*SCENES, SCENES[1]], known.get)
     assert batch.known_answers == 1
     assert batch.runs_left == 2
@@ -49,14 +50,14 @@ def test_equal_scenes_are_run_once_and_known_ones_never() -> None:
 def test_it_is_done_when_every_run_has_come_back_even_a_failed_one() -> None:
     batch = Batch(SCENES, unknown)
     tasks = [batch.next_task() for _ in SCENES]
-    batch.answer(tasks[0], Outcome.STEADY)
-    batch.answer(tasks[1], Outcome.FAILED)
+    batch.answer(tasks[0], RunAnswer(Outcome.STEADY))
+    batch.answer(tasks[1], RunAnswer(Outcome.FAILED))
     assert not batch.done
     batch.cancelled(tasks[2])
     assert not batch.done
     again = batch.next_task()
     assert again == tasks[2]
-    batch.answer(again, Outcome.STEADY)
+    batch.answer(again, RunAnswer(Outcome.STEADY))
     assert batch.done
     assert batch.next_task() is None
 

@@ -18,6 +18,7 @@ from ensemble.display.result_tables import boundary_cells, boundary_columns
 from ensemble.search.boundary import BoundaryPoint
 from ensemble.search.point_search import SearchRun
 from ensemble.search.study_planner import StudyPlanner
+from ensemble.search.task_queue import RunAnswer
 from solver.analysis.run import Outcome
 from solver.scene import Numerics, Shear
 
@@ -82,7 +83,7 @@ def run_study(
             assert planner.done, "known answers were all that it needed"
             break
         made.append(out.pop(choose(len(out))))
-        planner.answer(made[-1], answer(made[-1]))
+        planner.answer(made[-1], RunAnswer(answer(made[-1])))
         for unneeded in planner.unneeded_tasks():
             out.remove(unneeded)
             planner.cancelled(unneeded)
@@ -132,7 +133,7 @@ def test_what_is_known_is_never_run_again_and_changes_nothing(
 ) -> None:
     first = StudyPlanner(study, unknown)
     made = run_study(first, physics, 3, lambda out: out - 1)
-    known = {task.key: physics(task) for index, task in enumerate(made) if index in kept}
+    known = {task.key: RunAnswer(physics(task)) for index, task in enumerate(made) if index in kept}
     resumed = StudyPlanner(study, known.get, [task.scene for task in made])
     again = run_study(resumed, physics, 2)
     assert answers(resumed.boundary().points) == answers(first.boundary().points)
@@ -147,13 +148,13 @@ def test_asked_for_later_a_certification_adds_only_its_own_runs(study: Study) ->
     assert not any(is_finer(task) for task in searched)
     assert {(point.certified, point.certified_by) for point in plain.boundary().points} == {(False, None)}
 
-    known = {task.key: physics(task) for task in searched}
+    known = {task.key: RunAnswer(physics(task)) for task in searched}
     certified = StudyPlanner(study, known.get, [task.scene for task in searched])
     added = run_study(certified, physics, 2)
     assert added
     assert all(is_finer(task) for task in added)
 
-    known |= {task.key: physics(task) for task in added}
+    known |= {task.key: RunAnswer(physics(task)) for task in added}
     again = StudyPlanner(study, known.get, [task.scene for task in (*searched, *added)])
     assert again.done
     assert again.next_task() is None
@@ -166,7 +167,7 @@ def test_a_point_is_its_search_until_both_ends_are_certified(study: Study) -> No
     one_point = certified_study("[0.5]")
     planner, physics = StudyPlanner(one_point, unknown), TwoNumerics()
     while (task := planner.next_task()) is not None and not is_finer(task):
-        planner.answer(task, physics(task))
+        planner.answer(task, RunAnswer(physics(task)))
     other = planner.next_task()
     assert task is not None
     assert other is not None
@@ -175,7 +176,7 @@ def test_a_point_is_its_search_until_both_ends_are_certified(study: Study) -> No
     assert (task.value, other.value) == point.bracket, "both ends at once"
     assert (point.status, point.certified, point.certified_by) == ("certifying", False, None)
     assert planner.runs_left == 2
-    planner.answer(task, Outcome.FAILED)
+    planner.answer(task, RunAnswer(Outcome.FAILED))
     assert planner.boundary().points[0].bracket == point.bracket
     assert planner.boundary().points[0].status == "certifying"
 
@@ -223,7 +224,7 @@ def test_a_late_answer_that_contradicts_the_search_ends_its_certification() -> N
         while (task := planner.next_task()) is not None:
             out.append(task)
         certain = out.pop(0)
-        planner.answer(certain, physics(certain))
+        planner.answer(certain, RunAnswer(physics(certain)))
         for unneeded in planner.unneeded_tasks():
             if late is None:
                 late = unneeded  # it does not stop
@@ -235,13 +236,13 @@ def test_a_late_answer_that_contradicts_the_search_ends_its_certification() -> N
     assert all(map(is_finer, out))
     low, _ = planner.boundary().points[0].bracket
     assert low is not None
-    planner.answer(late, Outcome.BOUND if late.value <= low else Outcome.SEPARATED)
+    planner.answer(late, RunAnswer(Outcome.BOUND if late.value <= low else Outcome.SEPARATED))
     assert set(out) <= set(planner.unneeded_tasks())
     for task in out:
         planner.cancelled(task)
     while (task := planner.next_task()) is not None:
         assert not is_finer(task)
-        planner.answer(task, physics(task))
+        planner.answer(task, RunAnswer(physics(task)))
     assert planner.done
     (point,) = planner.boundary().points
     assert point.status == "non-monotone"
@@ -259,7 +260,7 @@ def test_certifying_comes_before_a_second_task_of_one_search() -> None:
         assert task is not None
         tasks.append(task)
         if task.sweep_value == 0.5 and not is_finer(task):
-            planner.answer(task, physics(task))
+            planner.answer(task, RunAnswer(physics(task)))
     following = []
     for _ in range(3):
         task = planner.next_task()
@@ -275,7 +276,7 @@ def test_certifying_comes_before_a_second_task_of_one_search() -> None:
 
 def test_a_search_that_others_finish_meanwhile_is_certified_at_once() -> None:
     one_point = certified_study("[0.5]")
-    known: dict[str, Outcome] = {}
+    known: dict[str, RunAnswer] = {}
     planner, physics = StudyPlanner(one_point, known.get), TwoNumerics()
     out = planner.next_task()
     scenes = [one_point.scene_at(0.5, GRID.value(index)) for index in INDICES]
@@ -283,11 +284,11 @@ def test_a_search_that_others_finish_meanwhile_is_certified_at_once() -> None:
         SearchRun(sweep_value=0.5, value=GRID.value(i), scene=scene, key=run_key(scene))
         for i, scene in zip(INDICES, scenes, strict=True)
     ]
-    known.update({task.key: physics(task) for task in tasks})
+    known.update({task.key: RunAnswer(physics(task)) for task in tasks})
     # The scan needs the run that is out, and nothing else: all other values are known.
     assert planner.next_task() is None
     assert out is not None
-    planner.answer(out, physics(out))
+    planner.answer(out, RunAnswer(physics(out)))
     task = planner.next_task()
     assert task is not None
     assert is_finer(task)

@@ -14,6 +14,7 @@ from ensemble.config.study import Study
 from ensemble.display.result_tables import boundary_cells, boundary_columns
 from ensemble.search.point_search import SearchRun
 from ensemble.search.study_planner import StudyPlanner
+from ensemble.search.task_queue import RunAnswer
 from solver.analysis.run import Outcome
 from solver.scene import Shear
 
@@ -53,7 +54,7 @@ def run_study(
             out.append(task)
         task = out.pop(choose(len(out)))
         made.append(task)
-        planner.answer(task, answer(task))
+        planner.answer(task, RunAnswer(answer(task)))
         for unneeded in planner.unneeded_tasks():
             out.remove(unneeded)
             planner.cancelled(unneeded)
@@ -90,7 +91,7 @@ def test_brackets_depend_neither_on_the_workers_nor_on_the_order_of_answers(
 def test_what_is_known_is_never_run_again_and_changes_nothing(study: Study, kept: set[int]) -> None:
     first = StudyPlanner(study, unknown)
     made = run_study(first, 3, lambda out: out - 1)
-    known = {task.key: outcome_of(task) for index, task in enumerate(made) if index in kept}
+    known = {task.key: RunAnswer(outcome_of(task)) for index, task in enumerate(made) if index in kept}
     resumed = StudyPlanner(study, known.get, [task.scene for task in made])
     assert resumed.known_answers == len(known)
     again = run_study(resumed, 2, lambda out: 0)
@@ -101,7 +102,7 @@ def test_what_is_known_is_never_run_again_and_changes_nothing(study: Study, kept
 def test_a_study_with_every_answer_has_no_task(study: Study) -> None:
     first = StudyPlanner(study, unknown)
     made = run_study(first, 2, lambda out: 0)
-    known = {task.key: outcome_of(task) for task in made}
+    known = {task.key: RunAnswer(outcome_of(task)) for task in made}
     again = StudyPlanner(study, known.get, [task.scene for task in made])
     assert again.done
     assert again.next_task() is None
@@ -114,9 +115,9 @@ def test_runs_of_other_scenes_are_no_answers(study: Study) -> None:
     task = StudyPlanner(study, unknown).next_task()
     assert task is not None
     finer = task.scene.model_copy(update={"numerics": task.scene.numerics.model_copy(update={"points": 128})})
-    known = {task.key: Outcome.BOUND}
+    known = {task.key: RunAnswer(Outcome.BOUND)}
     assert StudyPlanner(study, known.get, [finer]).known_answers == 1, "same place, found by the key"
-    assert StudyPlanner(study, {"another": Outcome.BOUND}.get, [finer]).known_answers == 0
+    assert StudyPlanner(study, {"another": RunAnswer(Outcome.BOUND)}.get, [finer]).known_answers == 0
 
 
 def test_workers_get_different_searches_before_any_search_gets_two(study: Study) -> None:
@@ -134,7 +135,7 @@ def test_the_last_search_is_cut_by_all_workers(study: Study) -> None:
         while not planner.done:
             tasks = [task for _ in range(workers) if (task := planner.next_task()) is not None]
             for task in tasks:
-                planner.answer(task, outcome_of(task))
+                planner.answer(task, RunAnswer(outcome_of(task)))
             turns[workers] += 1
     assert turns[3] <= math.ceil(0.7 * turns[1])
 
@@ -147,7 +148,7 @@ def test_a_slow_run_near_the_critical_value_is_not_waited_for() -> None:
         if slow is None and abs(task.value / critical(0.5) - 1) < 0.05:
             slow = task  # it never comes back
         else:
-            planner.answer(task, outcome_of(task))
+            planner.answer(task, RunAnswer(outcome_of(task)))
     assert slow is not None
     low, high = planner.boundary().points[0].bracket
     assert low is not None

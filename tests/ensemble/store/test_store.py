@@ -211,7 +211,7 @@ def test_summary_holds_every_scalar(store: Store) -> None:
 
 def test_unknown_run(store: Store) -> None:
     assert not store.contains("abc")
-    assert store.outcome("abc") is None
+    assert store.answer("abc") is None
     for read in (store.load, store.summary):
         with pytest.raises(StoreInputError, match="no run abc"):
             read("abc")
@@ -222,7 +222,7 @@ def test_staging_alone_makes_nothing_exist(store: Store) -> None:
     assert not store.contains(staged.key)
     assert store.summaries() == []
     assert store.commit(staged) == staged.key
-    assert store.outcome(staged.key) is Outcome.BOUND
+    assert store.answer(staged.key) == (Outcome.BOUND, False)
 
 
 def test_second_commit_of_a_key_keeps_the_first_run(store: Store) -> None:
