@@ -52,6 +52,7 @@ POINT_FIELDS = {
     "status",
     "changes",
     "scanned",
+    "confirmed",
     "certified",
     "certified_by",
     "runs",
