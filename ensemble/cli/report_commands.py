@@ -32,7 +32,8 @@ def report(  # numpydoc ignore=PR01
 ) -> None:
     """Measure the solver (errors, extreme scenes, scaling over all ranks), or recompute the paper.
 
-    The report is written into the store, which keeps its runs too: only what is missing is run.
+    The report is written into the store, which keeps its runs too: only what is missing is run.  What it
+    comes to is printed, in ten lines at most.
     """
     if only and name is not ReportName.PAPER:
         raise BadInput(f"--only: the report {name} has no sections")
@@ -49,11 +50,7 @@ def report(  # numpydoc ignore=PR01
     if as_json:
         print_json(made.document.model_dump(mode="json"))
     else:
-        from rich.console import Console
-        from rich.markdown import Markdown
-
-        Console().print(Markdown(made.text))
-        print(made.directory)
+        print("\n".join([*made.conclusions, f"The whole report: {made.directory / 'report.md'}"]))
 
 
 def _paper(only: list[str], quick: bool, store: Path, ranks_per_run: str | None) -> FinishedReport | None:

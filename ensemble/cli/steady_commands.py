@@ -26,15 +26,25 @@ def steady(  # numpydoc ignore=PR01
 ) -> None:
     """Compute the steady state to which a scene comes, and whether it is stable.
 
-    It starts from the end of the scene's run.  The exit status is 1 if there is no steady state.
+    It starts from the end of the scene's run.  Of a pair that revolves it tells whether the motion to which
+    it has settled is stable against what breaks its symmetry.  The exit status is 1 if there is no steady
+    state or the motion has not settled.
     """
     from ensemble.config.documents import load_scene
-    from ensemble.questions.branches import require_steady_states, steady_answer
+    from ensemble.questions.branches import (
+        require_steady_states,
+        revolves,
+        settled_answer,
+        steady_answer,
+    )
+    from solver.simulation.broken_symmetry import require_image
 
     with refusing():
         loaded = load_scene(scene, changes)
-        require_steady_states(loaded)
-    _print(lambda: steady_answer(loaded, None if no_store else store), as_json)
+        turns = revolves(loaded)
+        (require_image if turns else require_steady_states)(loaded)
+    answer = settled_answer if turns else steady_answer
+    _print(lambda: answer(loaded, None if no_store else store), as_json)
 
 
 def follow(  # numpydoc ignore=PR01

@@ -158,6 +158,59 @@ def steady_answer(scene: Scene, path: Path | None) -> Answer:
     return _SteadyAnswer(SteadyRecord.of(state).model_dump(mode="json"), run_key(scene))
 
 
+def settled_answer(scene: Scene, path: Path | None) -> Answer:
+    """Find out whether the motion to which a revolving pair settles is stable against broken symmetry.
+
+    Parameters
+    ----------
+    scene : Scene
+    path : Path or None
+        Directory of the store that keeps the run.
+
+    Returns
+    -------
+    Answer
+
+    Raises
+    ------
+    ValueError
+        If the pair has no symmetry that could be broken.
+    """
+    from solver.simulation.broken_symmetry import require_image, symmetry_breaking
+
+    require_image(scene)
+    with _opened(path) as store:
+        run = _run_of(scene, store)
+    if run.failure or run.period is None or not run.settled:
+        return _NoAnswer(f"the motion has not settled: {run.failure or run.undecided or run.outcome}")
+    try:
+        breaking = symmetry_breaking(run)
+    except ArithmeticError as error:
+        return _NoAnswer(str(error))
+    record = {
+        "outcome": run.outcome,
+        "period": run.period,
+        "stable": breaking.stable,
+        "growth_rate": breaking.growth_rate,
+        "growth_factor": breaking.factor,
+    }
+    return _SteadyAnswer(record, run_key(scene))
+
+
+def revolves(scene: Scene) -> bool:
+    """Return whether the flow turns several vesicles round, so that they have no steady state.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Returns
+    -------
+    bool
+    """
+    return len(scene.vesicles) > 1 and scene.flow is not None and scene.flow.rotates
+
+
 def require_steady_states(scene: Scene) -> None:
     """Refuse a scene whose steady states are not computed.
 
@@ -173,7 +226,7 @@ def require_steady_states(scene: Scene) -> None:
     count = len(scene.vesicles)
     if count > LARGEST_DENSE:
         raise ValueError(f"vesicles: steady states are computed of at most {LARGEST_DENSE}, got {count}")
-    if count > 1 and scene.flow is not None and scene.flow.rotates:
+    if scene.flow is not None and revolves(scene):
         raise ValueError(
             f"flow.kind: {scene.flow.kind!r} turns several vesicles round; they have no steady state"
         )
@@ -185,20 +238,25 @@ def _opened(path: Path | None) -> Any:
     return nullcontext() if path is None else Store.open(path)
 
 
-def _end_of_run(scene: Scene, store: Store | None) -> Shapes | str:
-    """Return the shapes at the end of the scene's run, from a store if it has it; or why there are none."""
-    from solver.analysis.run import Outcome
+def _run_of(scene: Scene, store: Store | None) -> Run:
+    """Return the run of a scene, from a store if it has it."""
     from solver.simulation.simulate import simulate
-    from solver.simulation.steady_scenes import Shapes
 
     key = run_key(scene)
-    run: Run
     if store is not None and store.contains(key):
-        run = store.load(key)
-    else:
-        run = simulate(scene)
-        if store is not None:
-            store.save(run)
+        return store.load(key)
+    run = simulate(scene)
+    if store is not None:
+        store.save(run)
+    return run
+
+
+def _end_of_run(scene: Scene, store: Store | None) -> Shapes | str:
+    """Return the shapes at the end of the scene's run, or why it comes to no rest."""
+    from solver.analysis.run import Outcome
+    from solver.simulation.steady_scenes import Shapes
+
+    run = _run_of(scene, store)
     if run.outcome in (Outcome.FAILED, Outcome.SEPARATED, Outcome.TUMBLING):
         return f"the run of the scene comes to no rest: {run.failure or run.outcome}"
     center = run.frames.center[-1]

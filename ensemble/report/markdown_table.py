@@ -39,6 +39,22 @@ def _cell(value: Any) -> str:
     return str(value).replace("|", "\\|")
 
 
+def bullets(sentences: Sequence[str]) -> str:
+    """Return sentences as a Markdown list.
+
+    Parameters
+    ----------
+    sentences : sequence of str
+        The sentences.
+
+    Returns
+    -------
+    str
+        One line for each.
+    """
+    return "\n".join(f"- {sentence}" for sentence in sentences)
+
+
 def made_on(machine: Machine) -> str:
     """Return a sentence on how the times of a report were measured.
 

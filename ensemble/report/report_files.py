@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -28,12 +28,15 @@ class FinishedReport:
     document : ReportModel
         The report as data.
     text : str
-        The report as Markdown.
+        The report as Markdown, which begins with the conclusions.
+    conclusions : sequence of str
+        What it comes to: a sentence each, ten at most.
     """
 
     directory: Path
     document: ReportModel
     text: str
+    conclusions: Sequence[str]
 
 
 def report_directory(store: Store, name: ReportName) -> Path:

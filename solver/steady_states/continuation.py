@@ -8,6 +8,7 @@ and nothing special happens to these unknowns.
 from __future__ import annotations
 
 from contextlib import suppress
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
@@ -33,7 +34,7 @@ _ITERATIONS = 24  # where branches meet convergence is linear: the Jacobian leav
 # Where branches meet, the equations hardly determine one direction, and round-off there is magnified.
 _RANK = 1e-10
 _ROUND_OFF = 1e-4
-_FIRST_STEP, _SMALLEST_STEP, _LARGEST_STEP = 0.02, 1e-5, 0.1
+_FIRST_STEP, _SMALLEST_STEP, _LARGEST_STEP = 0.02, 1e-7, 0.1
 _SMALL_CHANGE = 1e-4  # of a parameter, over its scale, in differences
 _STRAIGHT, _LEAST_STRAIGHT = 0.99, 0.95  # cosines of the angle between neighboring tangents
 _ROOT = 1e-9  # accuracy of folds and crossings, as a distance along the branch
@@ -247,7 +248,8 @@ class Continuation:
         part = (value - point.parameter) / (beyond.parameter - point.parameter)
         between = point.state + part * (beyond.state - point.state)
         state = steady_state(self._equations(value), between)
-        return self._point(np.append(state, value / self._scale), point.tangent)
+        reached = self._point(np.append(state, value / self._scale), point.tangent)
+        return replace(reached, parameter=value)  # the scale costs its last digit
 
     def _point(self, unknowns: Array, ahead: Array) -> BranchPoint:
         """Return a point with its tangent and stability; the tangent points ahead."""

@@ -18,7 +18,7 @@ import numpy as np
 
 from solver import Run, Scene, simulate
 from solver.membrane import curve
-from solver.scene import Criteria, Numerics
+from solver.scene import Criteria, Numerics, Output
 
 TRUTH = 1e-9
 FACTOR = 3.0
@@ -56,23 +56,26 @@ def finer(scene: Scene, factor: int, **changes: Any) -> Scene:
 
 
 def distance(run: Run, truth: Run) -> float:
-    """Return the root mean square of the distances between the points at the end."""
+    """Return the root mean square of the distances between the points at the end of a run."""
+    assert truth.frames.time[1] == run.time
     length = np.array([vesicle.length for vesicle in run.scene.vesicles])
-    points = [
-        curve.positions(each.frames.tangent_angle[-1], each.frames.center[-1], length)
-        for each in (run, truth)
-    ]
-    every = points[1].shape[-1] // points[0].shape[-1]
-    return float(np.sqrt(np.sum((points[0] - points[1][..., ::every]) ** 2, axis=-2).mean()))
+    given, true = (
+        curve.positions(frames.tangent_angle[at], frames.center[at], length)
+        for frames, at in ((run.frames, -1), (truth.frames, 1))
+    )
+    every = true.shape[-1] // given.shape[-1]
+    return float(np.sqrt(np.sum((given - true[..., ::every]) ** 2, axis=-2).mean()))
 
 
 def true_errors(run: Run, factor: int) -> dict[str, float | None]:
     """Return the true errors of a run's answers; None where it has none."""
-    truth = simulate(finer(run.scene, factor))
-    undecided = Criteria(
-        extensions=1.0, revolutions=1000, separated_distance=1e6, steady_rate=1e-300, steady_time=1e6
-    )
-    at_its_end = simulate(finer(run.scene, factor, horizon=run.time, criteria=undecided))
+    output = Output(interval=run.time, frame_interval=run.time)  # a frame at the end of the run
+    truth = at_its_end = simulate(finer(run.scene, factor, output=output))
+    if truth.time < run.time:
+        undecided = Criteria(
+            extensions=1.0, revolutions=1000, separated_distance=1e6, steady_rate=1e-300, steady_time=1e6
+        )
+        at_its_end = simulate(finer(run.scene, factor, output=output, horizon=run.time, criteria=undecided))
     same = run.outcome == truth.outcome
     return {
         "position": distance(run, at_its_end),

@@ -14,7 +14,7 @@ from ensemble.mpi.store_on_ranks import whole_store
 from ensemble.report import ReportName
 from ensemble.report.paper.comparison import Comparison
 from ensemble.report.paper.paper_document import Paper, PaperSection, ReportFigure
-from ensemble.report.paper.paper_text import paper_page, paper_text
+from ensemble.report.paper.paper_text import paper_conclusions, paper_page, paper_text
 from ensemble.report.paper.results import Results
 from ensemble.report.paper.section import Section, SectionContent, SectionFigure, SectionPlan
 from ensemble.report.report_files import FinishedReport, report_directory, write_report
@@ -83,7 +83,8 @@ def make_paper(
         wall_seconds=time.perf_counter() - begin,
         parts=parts,
     )
-    report = FinishedReport(report_directory(whole_store(store), ReportName.PAPER), paper, paper_text(paper))
+    directory = report_directory(whole_store(store), ReportName.PAPER)
+    report = FinishedReport(directory, paper, paper_text(paper), paper_conclusions(paper))
     write_report(report, figures, {"report.html": paper_page(paper)})
     return report
 

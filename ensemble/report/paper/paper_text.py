@@ -7,6 +7,7 @@ from string import Template
 
 from markdown_it import MarkdownIt
 
+from ensemble.report.markdown_table import bullets
 from ensemble.report.paper.comparison import PERCENT, Comparison, Value
 from ensemble.report.paper.paper_document import Paper, PaperSection, ReportFigure
 
@@ -40,6 +41,30 @@ $body
 """)
 
 
+def paper_conclusions(paper: Paper) -> list[str]:
+    """Return what the report comes to.
+
+    Parameters
+    ----------
+    paper : Paper
+        The report as data.
+
+    Returns
+    -------
+    list of str
+        A sentence each.
+    """
+    judged = [row for part in paper.parts for row in part.rows if row.agrees is not None]
+    apart = [part.title for part in paper.parts if any(row.agrees is False for row in part.rows)]
+    kept = sum(bool(row.agrees) for row in judged)
+    return [
+        f"{kept} of {len(judged)} values agree with the published ones within the allowed deviation.",
+        *([f"The others are in: {'; '.join(apart)}."] if apart else []),
+        f"{'Quick (thinned) report.  ' if paper.quick else ''}{paper.runs} runs were made now, in "
+        f"{paper.wall_seconds:.0f} s on {paper.ranks} ranks; the others were in the store.",
+    ]
+
+
 def paper_text(paper: Paper, suffix: str = ".png") -> str:
     """Return the report as Markdown.
 
@@ -55,17 +80,12 @@ def paper_text(paper: Paper, suffix: str = ".png") -> str:
     str
         The text.
     """
-    rows = [row for part in paper.parts for row in part.rows]
-    judged = [row for row in rows if row.agrees is not None]
-    kept = sum(bool(row.agrees) for row in judged)
     sections = [
         "# The paper, recomputed",
+        bullets(paper_conclusions(paper)),
         f"{_SOURCE}: its figures and tables, computed again and compared with the published values.  The "
         "*deviation* is that of the computed value from the published one; for brackets it is the distance "
         "between them, 0 where they overlap.",
-        f"{'Quick (thinned) report.  ' if paper.quick else ''}{kept} of {len(judged)} values agree with the "
-        f"published ones within the allowed deviation.  {paper.runs} runs were made now, in "
-        f"{paper.wall_seconds:.0f} s on {paper.ranks} ranks; the others were in the store.",
         f"Made on: {paper.machine.sentence()}.",
         "\n".join(f"- [{part.title}](#{_anchor(part)})" for part in paper.parts),
         *(text for part in paper.parts for text in _part_text(part, suffix)),

@@ -37,7 +37,7 @@ from ensemble.report.scaling.scaling_measurements import (
     peak_memory,
 )
 from ensemble.report.scaling.scaling_plan import FULL, POINTS, QUICK, ScalingPlan
-from ensemble.report.scaling.scaling_text import scaling_text
+from ensemble.report.scaling.scaling_text import scaling_conclusions, scaling_text
 from solver.scene import LARGEST_DENSE
 
 if TYPE_CHECKING:
@@ -77,7 +77,8 @@ def make_scaling(
         return None
     figures = scaling_figures(document)
     text = scaling_text(document, [f"{name}.png" for name in figures])
-    report = FinishedReport(report_directory(whole_store(store), ReportName.SCALING), document, text)
+    directory = report_directory(whole_store(store), ReportName.SCALING)
+    report = FinishedReport(directory, document, text, scaling_conclusions(document))
     write_report(report, figures)
     return report
 

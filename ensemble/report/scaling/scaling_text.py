@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ensemble.mpi.scaling_model import LEAST_EFFICIENCY, ScalingModel
-from ensemble.report.markdown_table import image_links, table
+from ensemble.report.markdown_table import bullets, image_links, table
 from ensemble.report.scaling.scaling_document import Scaling
 
 _EVALUATION = {
@@ -34,6 +34,32 @@ _COST = {
 _PREDICTION = {"vesicles": "vesicles", "ranks": "ranks", "efficiency": "efficiency"}
 
 
+def scaling_conclusions(report: Scaling) -> list[str]:
+    """Return what the report comes to.
+
+    Parameters
+    ----------
+    report : Scaling
+        The report as data.
+
+    Returns
+    -------
+    list of str
+        A sentence each.
+    """
+    crossover, most = report.crossover, max(report.evaluations, key=lambda row: (row.vesicles, row.ranks))
+    pays = f"beyond {crossover.vesicles} vesicles" if crossover.vesicles else "for no number measured"
+    worth = ", ".join(f"{row.ranks} for {row.vesicles} vesicles" for row in report.recommendations[-3:])
+    return [
+        f"{most.vesicles} vesicles: {most.seconds:.2g} s an evaluation on {most.ranks} ranks, an efficiency "
+        f"of {most.efficiency:.0%}.",
+        f"Ranks that are worth it (the model is {LEAST_EFFICIENCY:.0%} efficient): {worth}.",
+        f"Fast summation would pay {pays}.",
+        f"The model's largest deviation from a measured time is {report.largest_misprediction:.0%}.",
+        *(["There are more ranks than cores, so the times mean nothing."] if report.oversubscribed else []),
+    ]
+
+
 def scaling_text(report: Scaling, figures: Sequence[str]) -> str:
     """Return the report as Markdown.
 
@@ -50,11 +76,10 @@ def scaling_text(report: Scaling, figures: Sequence[str]) -> str:
         The text.
     """
     model, crossover = report.model, report.crossover
-    pays = f"beyond {crossover.vesicles} vesicles" if crossover.vesicles else "for no number measured"
-    crowded = "  There are more ranks than cores, so the times mean nothing." * report.oversubscribed
     sections = [
         "# Scaling",
-        f"Made on: {report.machine.sentence()}; {report.ranks} ranks, one thread each.{crowded}  "
+        bullets(scaling_conclusions(report)),
+        f"Made on: {report.machine.sentence()}; {report.ranks} ranks, one thread each.  "
         f"Evaluations of the right-hand side, {report.points} points on each vesicle: adhering vesicles in "
         "shear, at random places in a square of which they fill a fifth (2: the published pair, of which one "
         "is computed).  Each time is the least of several; compilation is not timed.",
@@ -81,7 +106,7 @@ def scaling_text(report: Scaling, figures: Sequence[str]) -> str:
         f"{crossover.assumption}  Then a point costs as much as {crossover.pairs_a_point:.0f} pairs of the "
         f"direct sum, of {crossover.pair_seconds:.2g} s each here, and {crossover.point_seconds:.2g} s in an "
         f"evaluation.  Against that, series of whole vesicles make the time above grow by {model.pair:.2g} s "
-        f"for each pair: fast summation pays {pays}.",
+        f"for each pair.",
         table(_COST, report.costs),
     ]
     return "\n\n".join(sections) + "\n"

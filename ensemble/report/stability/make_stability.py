@@ -11,7 +11,9 @@ from ensemble.config.run_key import run_key
 from ensemble.report import ReportName
 from ensemble.report.report_files import FinishedReport, report_directory, write_report
 from ensemble.report.report_model import Machine
+from ensemble.report.stability.bound_pairs import bound_pairs, pair_symmetry
 from ensemble.report.stability.extreme_scenes import EXTREME_SCENES
+from ensemble.report.stability.stability_conclusions import stability_conclusions
 from ensemble.report.stability.stability_document import (
     CRITERIA,
     LARGEST_DRIFT,
@@ -52,15 +54,22 @@ def make_stability(store: Store, quick: bool, log: Callable[[str], None]) -> Fin
     FinishedReport
         The report.
     """
-    document = judge_scenes(TimedRuns(store, log), quick_groups(EXTREME_SCENES) if quick else EXTREME_SCENES)
+    runs = TimedRuns(store, log)
+    document = Stability(
+        machine=Machine.here(),
+        criteria=CRITERIA,
+        rows=judge_scenes(runs, quick_groups(EXTREME_SCENES) if quick else EXTREME_SCENES),
+        pairs=[pair_symmetry(runs, pair) for pair in bound_pairs(quick)],
+    )
     figures = {"scenes": stability_figure(document)}
     text = stability_text(document, [f"{name}.png" for name in figures])
-    report = FinishedReport(report_directory(store, ReportName.STABILITY), document, text)
+    directory = report_directory(store, ReportName.STABILITY)
+    report = FinishedReport(directory, document, text, stability_conclusions(document))
     write_report(report, figures)
     return report
 
 
-def judge_scenes(runs: TimedRuns, groups: SceneGroups) -> Stability:
+def judge_scenes(runs: TimedRuns, groups: SceneGroups) -> list[SceneVerdict]:
     """Run every scene to its end and judge it.
 
     Parameters
@@ -72,15 +81,14 @@ def judge_scenes(runs: TimedRuns, groups: SceneGroups) -> Stability:
 
     Returns
     -------
-    Stability
-        The report as data.
+    list of SceneVerdict
+        One for each scene.
     """
-    verdicts = [
+    return [
         _verdict(runs, group, name, scene)
         for group, scenes in groups.items()
         for name, scene in scenes.items()
     ]
-    return Stability(machine=Machine.here(), criteria=CRITERIA, rows=verdicts)
 
 
 def quick_groups(groups: SceneGroups) -> dict[str, dict[str, Scene]]:

@@ -95,6 +95,44 @@ class SceneVerdict(ReportModel):
     run_key: str | None = None
 
 
+class PairSymmetry(ReportModel):
+    """Whether a bound pair in shear returns to the symmetry in which it is computed.
+
+    Attributes
+    ----------
+    group, scene : str
+        Names of the scene and of its group.
+    outcome : Outcome
+        Outcome of the run, which computes one vesicle and its image.
+    period : float or None
+        Of the motion to which it has settled.
+    growth_rate : float or None
+        Of a difference between the vesicles, mean over a period, 1/time; None if the motion has not settled
+        or a step failed.
+    growth_factor : float or None
+        By how much the difference grows in a period.
+    stable : bool or None
+        Whether the difference decays.
+    reason : str
+        Why it was not followed; empty if it was.
+    wall_seconds : float
+        Time of the run.
+    run_key : str
+        Key of the run.
+    """
+
+    group: str
+    scene: str
+    outcome: Outcome
+    period: float | None = None
+    growth_rate: float | None = None
+    growth_factor: float | None = None
+    stable: bool | None = None
+    reason: str = ""
+    wall_seconds: float
+    run_key: str
+
+
 class Stability(ReportModel):
     """The whole report.
 
@@ -108,9 +146,12 @@ class Stability(ReportModel):
         When each verdict is given, in the order in which the criteria are tested.
     rows : list of SceneVerdict
         One for each scene.
+    pairs : list of PairSymmetry
+        One for each bound pair.
     """
 
     report: str = "stability"
     machine: Machine
     criteria: Mapping[StabilityVerdict, str]
     rows: list[SceneVerdict]
+    pairs: list[PairSymmetry]

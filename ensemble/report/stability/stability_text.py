@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ensemble.report.markdown_table import image_links, made_on, table
-from ensemble.report.stability.stability_document import Stability, StabilityVerdict
+from ensemble.report.markdown_table import bullets, image_links, made_on, table
+from ensemble.report.stability.stability_conclusions import stability_conclusions
+from ensemble.report.stability.stability_document import Stability
 
 # Headings of the table, and the fields below them.
 _SCENE_VERDICT = {
@@ -27,6 +28,25 @@ _SCENE_VERDICT = {
     "seconds": "wall_seconds",
 }
 
+_PAIR_SYMMETRY = {
+    "": "group",
+    "scene": "scene",
+    "outcome": "outcome",
+    "period": "period",
+    "growth rate": "growth_rate",
+    "factor in a period": "growth_factor",
+    "stable": "stable",
+    "remark": "reason",
+    "seconds of the run": "wall_seconds",
+}
+
+_PAIRS = (
+    "A pair of equal vesicles is computed as one and its image, which cannot show what breaks this "
+    "symmetry.  So both are computed, each on its own, from the end of the run, with a small difference "
+    "between them, for two periods.  The growth is that in the second one, of the difference that decays "
+    "most slowly.  `ensemble steady` does the same for one scene."
+)
+
 
 def stability_text(report: Stability, figures: Sequence[str]) -> str:
     """Return the report as Markdown.
@@ -43,11 +63,10 @@ def stability_text(report: Stability, figures: Sequence[str]) -> str:
     str
         The text.
     """
-    counts = {verdict: sum(row.verdict is verdict for row in report.rows) for verdict in StabilityVerdict}
     sections = [
-        "# Stiff and extreme scenes",
+        "# Stability: stiff and extreme scenes, and the symmetry of pairs",
+        bullets(stability_conclusions(report)),
         made_on(report.machine),
-        f"{len(report.rows)} scenes: " + ", ".join(f"{count} {verdict}" for verdict, count in counts.items()),
         *image_links(figures),
         "## Verdicts",
         "The first of these criteria that holds:",
@@ -56,4 +75,5 @@ def stability_text(report: Stability, figures: Sequence[str]) -> str:
     for group in dict.fromkeys(row.group for row in report.rows):
         rows = [row for row in report.rows if row.group == group]
         sections += [f"## {group.capitalize()}", table(_SCENE_VERDICT, rows)]
+    sections += ["## Symmetry of bound pairs", _PAIRS, table(_PAIR_SYMMETRY, report.pairs)]
     return "\n\n".join(sections) + "\n"

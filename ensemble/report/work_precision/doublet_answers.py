@@ -58,6 +58,8 @@ def doublet_answers(runs: TimedRuns, plan: WorkPrecisionPlan) -> list[DoubletAns
                     viscosity=viscosity,
                     period_error=_relative_error(run.period, converged.period),
                     viscosity_error=_relative_error(viscosity, converged.viscosity.total),
+                    period_reported=_relative_size(run.error.period, run.period),
+                    viscosity_reported=_relative_size(run.error.viscosity, viscosity),
                     wall_seconds=run.wall_seconds,
                     evaluations=run.work.rhs_evaluations,
                     failure=run.failure,
@@ -94,6 +96,10 @@ def _doublet(plan: WorkPrecisionPlan, method: ComparedMethod, points: int, toler
 
 def _relative_error(value: float | None, converged: float) -> float | None:
     return None if value is None else abs(value / converged - 1)
+
+
+def _relative_size(error: float | None, value: float | None) -> float | None:
+    return None if error is None or value is None else error / abs(value)
 
 
 def _critical_bracket(runs: TimedRuns, plan: WorkPrecisionPlan, tolerance: float) -> CriticalBracket:

@@ -13,6 +13,7 @@ from ensemble.report.work_precision.least_times import least_times
 from ensemble.report.work_precision.observed_orders import observed_orders
 from ensemble.report.work_precision.position_errors import measure_scene
 from ensemble.report.work_precision.short_scenes import SHORT_SCENES
+from ensemble.report.work_precision.work_precision_conclusions import work_precision_conclusions
 from ensemble.report.work_precision.work_precision_document import WorkPrecision
 from ensemble.report.work_precision.work_precision_figures import work_precision_figures
 from ensemble.report.work_precision.work_precision_plan import FULL, QUICK, WorkPrecisionPlan
@@ -44,7 +45,8 @@ def make_work_precision(store: Store, quick: bool, log: Callable[[str], None]) -
     document = measure_work_precision(TimedRuns(store, log), QUICK if quick else FULL, SHORT_SCENES)
     figures = work_precision_figures(document)
     text = work_precision_text(document, [f"{name}.png" for name in figures])
-    report = FinishedReport(report_directory(store, ReportName.WORK_PRECISION), document, text)
+    directory = report_directory(store, ReportName.WORK_PRECISION)
+    report = FinishedReport(directory, document, text, work_precision_conclusions(document))
     write_report(report, figures)
     return report
 

@@ -120,6 +120,7 @@ def _series(
                 tolerance=tolerance,
                 error_rms=rms,
                 error_max=largest,
+                error_reported=run.error.global_,
                 wall_seconds=run.work.wall_seconds,
                 evaluations=run.work.rhs_evaluations,
                 steps=run.work.steps,

@@ -46,6 +46,8 @@ class Measurement(ReportModel):
     error_rms, error_max : float or None
         Distance of the final membranes from those of the converged run, over all points; None if the run
         failed.
+    error_reported : float or None
+        That of positions which the run itself reports (`error.global`); None if it reports none.
     wall_seconds : float
         Time that the simulation took.
     evaluations, steps : int
@@ -62,6 +64,7 @@ class Measurement(ReportModel):
     tolerance: float
     error_rms: float | None
     error_max: float | None
+    error_reported: float | None
     wall_seconds: float
     evaluations: int
     steps: int
@@ -139,6 +142,8 @@ class DoubletAnswer(ReportModel):
         None if the run failed.
     period_error, viscosity_error : float or None
         Relative difference from the converged run.
+    period_reported, viscosity_reported : float or None
+        The same as the run itself reports it.
     wall_seconds : float
         Time that the simulation took.
     evaluations : int
@@ -156,6 +161,8 @@ class DoubletAnswer(ReportModel):
     viscosity: float | None
     period_error: float | None
     viscosity_error: float | None
+    period_reported: float | None
+    viscosity_reported: float | None
     wall_seconds: float
     evaluations: int
     failure: str | None

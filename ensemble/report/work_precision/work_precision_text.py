@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ensemble.report.markdown_table import image_links, made_on, table
+from ensemble.report.markdown_table import bullets, image_links, made_on, table
 from ensemble.report.work_precision.doublet_answers import SHEAR_RATE
 from ensemble.report.work_precision.observed_orders import FLOOR
+from ensemble.report.work_precision.work_precision_conclusions import work_precision_conclusions
 from ensemble.report.work_precision.work_precision_document import WorkPrecision
 
 # Columns of the tables: headings, and the fields below them.
@@ -40,6 +41,7 @@ _MEASUREMENT = {
     "N": "points",
     "tolerance": "tolerance",
     "RMS error": "error_rms",
+    "reported": "error_reported",
     "largest error": "error_max",
     "seconds": "wall_seconds",
     "evaluations": "evaluations",
@@ -52,8 +54,10 @@ _ANSWER = {
     "tolerance": "tolerance",
     "period": "period",
     "error of the period": "period_error",
+    "reported": "period_reported",
     "viscosity": "viscosity",
     "error of the viscosity": "viscosity_error",
+    "reported, too": "viscosity_reported",
     "seconds": "wall_seconds",
     "evaluations": "evaluations",
     "failure": "failure",
@@ -84,6 +88,7 @@ def work_precision_text(report: WorkPrecision, figures: Sequence[str]) -> str:
     """
     sections = [
         "# Work and precision",
+        bullets(work_precision_conclusions(report)),
         made_on(report.machine),
         "The error of a position is the distance of a membrane's points, at the final time, from the "
         "membrane of the converged run.  How points move along a membrane is a choice without physics in "
@@ -105,7 +110,7 @@ def work_precision_text(report: WorkPrecision, figures: Sequence[str]) -> str:
         "## Position error",
         table(_MEASUREMENT, report.measurements),
         "## Answers: period and intrinsic viscosity of the doublet in shear",
-        "Relative errors, from a converged run.",
+        "Relative errors, from a converged run, and beside them those that the run itself reports.",
         table(_ANSWER, report.answers),
     ]
     if report.critical_values:

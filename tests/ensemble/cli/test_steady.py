@@ -118,7 +118,14 @@ def test_the_diagram_shows_stable_and_unstable_parts_up_to_the_fold(followed):
 
 
 REFUSED = {
-    "a pair that revolves": (["steady", "doublet-shear"], "flow.kind"),
+    "a branch of a pair that revolves": (
+        ["continue", "doublet-shear", "--parameter=flow.rate"],
+        "flow.kind",
+    ),
+    "an unequal pair that revolves": (
+        ["steady", "doublet-shear", "--set=vesicles.1.reduced_area=0.8"],
+        "vesicles",
+    ),
     "many vesicles": (["steady", "suspension-shear"], "vesicles"),
     "no number": (["continue", *TREADING, "--parameter=flow.kind"], "flow.kind"),
     "the same value": ([*FOLLOWED, "--to=4.2"], "to"),
@@ -140,3 +147,22 @@ def test_a_run_that_does_not_rest_has_no_steady_state(ensemble):
     result = ensemble("steady", *TREADING, "--set=vesicles.viscosity_contrast=6", "--no-store", "--json")
     assert result.returncode == 1
     assert "tumbling" in json.loads(result.stdout)["failure"]
+
+
+def test_of_a_pair_that_revolves_the_stability_of_its_motion_is_told(ensemble, tmp_path):
+    coarse = ("--set=numerics.points=32", "--set=adhesion.hamaker=1.0", f"--store={tmp_path / 'store'}")
+    result = ensemble("steady", "doublet-shear", *coarse, "--json")
+    assert result.returncode == 0, result.stderr
+    answer = json.loads(result.stdout)
+    assert answer["stable"] is True
+    assert answer["growth_factor"] == pytest.approx(
+        np.exp(answer["growth_rate"] * answer["period"]), rel=1e-12
+    )
+    run = ensemble("run", "doublet-shear", *coarse, "--json")
+    assert json.loads(run.stdout)["run_key"] == answer["run_key"]
+
+
+def test_a_motion_that_has_not_settled_has_no_stability(ensemble):
+    result = ensemble("steady", "doublet-shear", "--set=adhesion.hamaker=0.1", "--no-store", "--json")
+    assert result.returncode == 1
+    assert "separated" in json.loads(result.stdout)["failure"]

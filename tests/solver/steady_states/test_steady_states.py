@@ -216,6 +216,12 @@ def test_a_branch_ends_where_the_scene_allows_no_more() -> None:
     assert branch.points[-1].parameter == pytest.approx(0.803, abs=1e-4)
 
 
+def test_a_branch_ends_exactly_at_the_value_asked_for() -> None:
+    near = rest_of(trapped(0.05))
+    branch = follow_steady_states(lambda area: trapped(0.05, area), 0.8, near, Limits(0.85), upward=True)
+    assert branch.points[-1].parameter == 0.85  # which is not 0.85 / 0.8 · 0.8
+
+
 def test_a_branch_with_both_vesicles_changed_apart_loses_its_symmetry() -> None:
     def scene_at(reduced_area: float) -> Scene:
         scene = trapped(0.05)

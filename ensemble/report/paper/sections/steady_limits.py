@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Final
 
 import matplotlib
@@ -15,7 +15,7 @@ from ensemble.figures.bifurcation import bifurcation_diagram
 from ensemble.figures.style import BLACK, GRAY, STYLE, VERMILLION, WIDTH
 from ensemble.figures.symbols import quantity
 from ensemble.report.paper.case import Case, StudyCase
-from ensemble.report.paper.comparison import Comparison, Value, published
+from ensemble.report.paper.comparison import Comparison, Interval, Value, published
 from ensemble.report.paper.results import Results
 from ensemble.report.paper.section import (
     Section,
@@ -149,19 +149,37 @@ def _fold(branch: SteadyBranch | None) -> float | None:
 
 
 def _limit(
-    quantity: str, known: Value, value: float | None, case: Case, others: Mapping[str, str]
+    quantity: str, known: Value, value: float | None, case: Case, bracket: Interval | None = None
 ) -> Comparison:
-    """Return a row: the limit to nine digits, with what it is set beside."""
-    digits = {"computed": f"{value:.9g}"} if value is not None else {}
-    note = "; ".join(f"{name} {text}" for name, text in (digits | dict(others)).items())
+    """Return a row: the limit to nine digits, beside the bracket of bisection."""
+    notes = [] if value is None else [f"computed {value:.9g}"]
+    if bracket is not None:
+        notes.append(f"bisection {bracket[0]:.5g} to {bracket[1]:.5g}{_place(value, bracket)}")
     return Comparison(
-        quantity=quantity, published=known, computed=value, note=note, runs=[case.key], command=case.command
+        quantity=quantity,
+        published=known,
+        computed=value,
+        note="; ".join(notes),
+        runs=[case.key],
+        command=case.command,
     )
 
 
-def _bisection(results: Results, study: StudyCase, area: float) -> dict[str, str]:
-    bracket = results.brackets(study).get(area)
-    return {} if bracket is None else {"bisection": f"{bracket[0]:.5g} to {bracket[1]:.5g}"}
+def _place(limit: float | None, bracket: Interval) -> str:
+    """Return where a limit lies beside a bracket, and why if it is not inside."""
+    low, high = bracket
+    if limit is None:
+        return ""
+    if low <= limit <= high:
+        return ", the limit inside"
+    if limit > high:
+        return (
+            f", the limit {limit / high - 1:.2%} above: a stable state is there, but the start of bisection "
+            "misses it"
+        )
+    return (
+        f", the limit {1 - limit / low:.2%} below: this state is gone there, and bisection finds another one"
+    )
 
 
 def _trap_comparisons(results: Results, study: StudyCase, areas: tuple[float, ...]) -> Iterator[Comparison]:
@@ -170,7 +188,7 @@ def _trap_comparisons(results: Results, study: StudyCase, areas: tuple[float, ..
         case = _side_by_side(area)
         fold = _fold(_branch(results, case, _RATE, Limits(np.inf)))
         name = f"rate at which side by side ends (fold), ΔA = {area:g}"
-        yield _limit(name, known.get(area), fold, case, _bisection(results, study, area))
+        yield _limit(name, known.get(area), fold, case, results.brackets(study).get(area))
 
 
 def _tip_to_tip_comparisons(results: Results, areas: tuple[float, ...]) -> Iterator[Comparison]:
@@ -186,8 +204,8 @@ def _tip_to_tip_comparisons(results: Results, areas: tuple[float, ...]) -> Itera
         lower = _branch(results, case, _RATE, Limits(_LEAST_RATE), near)
         upper = _branch(results, case, _RATE, Limits(np.inf), near)
         crossing = max((point.parameter for point in lower.crossings), default=None) if lower else None
-        yield _limit(f"rate at which tip to tip begins (crossing), ΔA = {area:g}", None, crossing, case, {})
-        yield _limit(f"rate at which tip to tip ends (fold), ΔA = {area:g}", None, _fold(upper), case, {})
+        yield _limit(f"rate at which tip to tip begins (crossing), ΔA = {area:g}", None, crossing, case)
+        yield _limit(f"rate at which tip to tip ends (fold), ΔA = {area:g}", None, _fold(upper), case)
 
 
 def _treading_comparisons(
@@ -197,7 +215,7 @@ def _treading_comparisons(
         case = _treading(area)
         fold = _fold(_branch(results, case, _CONTRAST, Limits(np.inf)))
         name = f"contrast at which treading ends (fold), ΔA = {area:g} (published: Keller and Skalak)"
-        yield _limit(name, keller_skalak(area), fold, case, _bisection(results, study, area))
+        yield _limit(name, keller_skalak(area), fold, case, results.brackets(study).get(area))
 
 
 _TEXT = (

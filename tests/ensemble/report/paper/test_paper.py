@@ -95,7 +95,9 @@ def test_text_and_page_say_the_same() -> None:
     part = PaperSection(name="shear", title="Shear", content=["What *one* sees.", rows, figure])
     paper = Paper(quick=False, machine=Machine.here(), ranks=2, runs=3, wall_seconds=1.0, parts=[part])
     text, page = paper_text(paper), paper_page(paper)
-    assert "1 of 2 values agree with the published ones within the allowed deviation" in text
+    first, second, _ = text.split("\n\n")[1].splitlines()
+    assert first == "- 1 of 2 values agree with the published ones within the allowed deviation."
+    assert second == "- The others are in: Shear."
     assert "| period, γ̇ = 0.5 | 36.34 | 36.22 | -0.33 % ✓ | ± 1 % |  |" in text
     assert "| 0.3 to 0.4 | 0.5 to 0.51 | +25.00 % ✗ | ± 3 % | a\\|b |" in text
     assert CASE.key[:8] in text

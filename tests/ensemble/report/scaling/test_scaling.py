@@ -32,7 +32,7 @@ from ensemble.report.scaling.scaling_fit import (
     summation_crossover,
 )
 from ensemble.report.scaling.scaling_plan import FULL, POINTS, QUICK, ScalingPlan, suspension
-from ensemble.report.scaling.scaling_text import scaling_text
+from ensemble.report.scaling.scaling_text import scaling_conclusions, scaling_text
 from ensemble.report.scaling.time_shares import _PART_OF_FOLDER, _PART_OF_MODULE, PARTS, time_shares
 from solver.parallel import SERIAL
 from tests.conftest import Launcher
@@ -192,6 +192,7 @@ def assert_drawn_and_written(report: Scaling, directory: Path) -> None:
         assert (directory / f"{name}.png").read_bytes().startswith(b"\x89PNG")
     text = scaling_text(report, ["cost.png"])
     assert "![cost.png](cost.png)" in text
+    assert text.split("\n\n")[1].splitlines() == [f"- {each}" for each in scaling_conclusions(report)]
     assert f"{report.crossover.pairs_a_point:.0f} pairs of the direct sum" in text
     for point in report.evaluations:
         assert f"{point.seconds:.4g}" in text

@@ -10,7 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ensemble.config.documents import load_scene, load_study
 from ensemble.report.stability import make_stability as make_stability_module
+from ensemble.report.stability.bound_pairs import UPPER_ENDS, BoundPair, bound_pairs
 from ensemble.report.stability.extreme_scenes import EXTREME_SCENES
 from ensemble.report.stability.make_stability import (
     energy_rise,
@@ -61,6 +63,16 @@ def test_the_extreme_scenes_reach_what_they_should():
     assert any(len({vesicle.length for vesicle in scene.vesicles}) == 2 for scene in scenes)
 
 
+def test_the_bound_pairs_are_those_of_the_default_study_and_twenty_more() -> None:
+    pairs = list(bound_pairs(quick=False))
+    study = load_study("critical-hamaker")
+    assert list(study.sweep.values) == list(UPPER_ENDS)
+    of_study = [pair.scene for pair in pairs if pair.group == "default study"]
+    assert of_study == [study.scene_at(rate, hamaker) for rate, hamaker in UPPER_ENDS.items()]
+    assert len(pairs) == len({pair.name for pair in pairs}) == len(of_study) + 20
+    assert len(list(bound_pairs(quick=True))) == 3
+
+
 def test_verdicts_follow_the_criteria():
     pair = EXTREMES["start at a quarter of the adhesion distance, at rest"]
     coarse = Numerics(points=48, tolerance=1e-3)
@@ -94,7 +106,7 @@ def test_a_scene_that_raises_does_not_hide_the_others(store):
     limited = good.model_copy(update={"flow": Trap(rate=0.1), "numerics": Numerics(points=32, work_limit=5)})
     rows = judge_scenes(
         TimedRuns(store, lambda line: None), {"group": {"broken": broken, "limited": limited, "good": good}}
-    ).rows
+    )
     assert [row.verdict for row in rows] == [
         StabilityVerdict.FAILED,
         StabilityVerdict.FAILED,
@@ -121,14 +133,26 @@ def test_a_report_is_written_into_the_store_and_resumes(
     scene = Scene(horizon=2.0, vesicles=(Vesicle(),), numerics=Numerics(points=32, tolerance=1e-3))
     in_trap = scene.model_copy(update={"flow": Trap(rate=0.1)})
     groups = {"at rest": {"one vesicle": scene, "not in a quick report": in_trap}, "flow": {"trap": in_trap}}
+    doublet = load_scene("doublet-shear", ["adhesion.hamaker=1.0", "numerics.points=32"])
+    apart = load_scene("doublet-shear", ["adhesion.hamaker=0.1", "numerics.points=32"])
+    pairs = [BoundPair("pairs", "doublet", doublet), BoundPair("pairs", "apart", apart)]
     monkeypatch.setattr(make_stability_module, "EXTREME_SCENES", groups)
+    monkeypatch.setattr(make_stability_module, "bound_pairs", lambda quick: iter(pairs))
     lines: list[str] = []
     report = make_stability(store, quick=True, log=lines.append)
-    assert lines == ["at rest: one vesicle", "flow: trap"]
+    assert lines == ["at rest: one vesicle", "flow: trap", "pairs: doublet", "pairs: apart"]
+    bound, separated = report.document.pairs
+    assert bound.stable
+    assert 0 < bound.growth_factor < 1e-6
+    assert separated.stable is None
+    assert "separated" in separated.reason
+    assert len(report.conclusions) <= 10
+    assert report.text.split("\n\n")[1].splitlines() == [f"- {each}" for each in report.conclusions]
+    assert "1 of 1 bound pairs" in report.conclusions[-2]
     assert report.directory == store.path / "reports" / "stability"
     assert_written(report.directory, report.document)
     assert make_stability(store, quick=True, log=lines.append).document == report.document
-    assert len(lines) == 2
+    assert len(lines) == 4
 
 
 @pytest.mark.long
@@ -138,12 +162,16 @@ def test_the_command_writes_a_report_into_the_store_and_resumes(ensemble, tmp_pa
     assert first.returncode == 0, first.stderr
     document = Stability.model_validate_json(first.stdout)
     quick = quick_groups(EXTREME_SCENES)
-    names = [name for scenes in quick.values() for name in scenes]
-    assert [row.scene for row in document.rows] == names
+    scenes = [name for scenes in quick.values() for name in scenes]
+    assert [row.scene for row in document.rows] == scenes
+    names = scenes + [pair.name for pair in bound_pairs(quick=True)]
+    assert all(pair.stable for pair in document.pairs)
     assert [line.partition(": ")[2] for line in first.stderr.splitlines()] == names
     assert all(row.evaluations <= 3_500 for row in document.rows)
     assert_written(tmp_path / "store" / "reports" / "stability", document)
 
+    for conclusion in ensemble(*command[:-1]).stdout.splitlines()[:-1]:
+        assert conclusion in (tmp_path / "store" / "reports" / "stability" / "report.md").read_text()
     again = ensemble(*command)
     assert again.stderr == ""
     assert json.loads(again.stdout) == json.loads(first.stdout)

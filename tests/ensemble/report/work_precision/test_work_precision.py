@@ -14,6 +14,7 @@ from ensemble.report.work_precision.least_times import ERRORS, least_times
 from ensemble.report.work_precision.make_work_precision import measure_work_precision
 from ensemble.report.work_precision.observed_orders import observed_orders
 from ensemble.report.work_precision.short_scenes import SHORT_SCENES
+from ensemble.report.work_precision.work_precision_conclusions import work_precision_conclusions
 from ensemble.report.work_precision.work_precision_document import Measurement, WorkPrecision
 from ensemble.report.work_precision.work_precision_figures import work_precision_figures
 from ensemble.report.work_precision.work_precision_plan import (
@@ -91,6 +92,37 @@ def test_a_report_resumes_without_running_anything_again(report, store):
     assert again == report
 
 
+def test_the_reported_error_is_that_of_the_run_and_agrees_with_the_true_one(report, store):
+    tight = report.measurements[-1]
+    assert tight.error_reported == store.summary(tight.run_key).error.global_
+    (answer,) = report.answers
+    run = store.summary(answer.run_key)
+    assert answer.period_reported == run.error.period / run.period
+    assert answer.period_error < 3 * answer.period_reported
+
+
+def test_the_conclusions_say_which_numerics_reach_an_error_in_what_time(report):
+    row = report.envelopes[0].model_copy(
+        update={"error": 1e-3, "default": "BDF", "fastest": "BDF", "default_seconds": 0.5, "slowdown": 1.0}
+    )
+    measured = report.measurements[-1].model_copy(
+        update={"scene": row.scene, "wall_seconds": 0.5, "tolerance": 1e-4, "points": 48}
+    )
+    made_up = report.model_copy(
+        update={
+            "envelopes": [row, row.model_copy(update={"error": 1e-7, "slowdown": 1.5, "fastest": "Euler"})],
+            "measurements": [measured],
+        }
+    )
+    overall, at_one_error, *_ = work_precision_conclusions(made_up)
+    assert "fastest at 1 of 2 errors" in overall
+    assert "1.5 times" in overall
+    assert "Euler" in overall
+    assert at_one_error == (
+        f"{row.scene}, error 0.001: BDF, the default, 0.5 s with tolerance 0.0001 and 48 points; the fastest."
+    )
+
+
 def test_the_document_survives_json(report):
     document = json.loads(report.model_dump_json())
     assert document.keys() == {
@@ -119,6 +151,9 @@ def test_the_report_is_drawn_and_written(report, tmp_path):
     )
     text = work_precision_text(report, ["errors.png"])
     assert "![errors.png](errors.png)" in text
+    conclusions = work_precision_conclusions(report)
+    assert len(conclusions) <= 10
+    assert text.split("\n\n")[1].splitlines() == [f"- {conclusion}" for conclusion in conclusions]
     assert report.machine.processor in text
     for measurement in report.measurements:
         assert f"{measurement.error_rms:.4g}" in text
