@@ -36,7 +36,7 @@ FORBIDDEN = {
 # Folders and modules directly in each package, from the lowest.  Those of one line do not import each other.
 ORDER = {
     "solver": """
-        compilation model parallel registry revision
+        compilation model parallel registry revision roots
         flows pair_potentials
         scene
         membrane
@@ -198,6 +198,10 @@ def test_dependencies_point_one_way(package: str) -> None:
     [
         ("solver.scene", ["numba", "scipy", "mpi4py", "h5py", "zarr", "sqlalchemy", "matplotlib"]),
         ("solver.simulation.simulate", ["ensemble", "mpi4py", "h5py", "zarr", "sqlalchemy", "matplotlib"]),
+        (
+            "solver.simulation.simulate",
+            ["scipy.interpolate", "scipy.optimize", "scipy.sparse", "scipy.spatial"],
+        ),
     ],
 )
 def test_what_an_import_loads(module: str, unwanted: list[str]) -> None:

@@ -71,10 +71,11 @@ class AnswerErrors:
             self._at_passages.append(_time_error(step, time, tracker.angle_of) if time > 0 else np.zeros(2))
             begin = tracker.passages[-3] if len(tracker.passages) > 2 else 0.0
             self._samples = [sample for sample in self._samples if sample.time >= begin]
-        self._samples.append(_Sample(step.end, step.state, step.error(step.end)))
+        error = step.error(step.end)
+        self._samples.append(_Sample(step.end, step.state, error))
         if isinstance(tracker, LineOfCenters):
-            self._follow_distance(step, tracker)
-            self.sensitive |= _transverse_error(step) > _LARGEST_TRANSVERSE
+            self._follow_distance(step, error, tracker)
+            self.sensitive |= _transverse_error(step, error[:, 0]) > _LARGEST_TRANSVERSE
 
     @property
     def period(self) -> float | None:
@@ -125,13 +126,14 @@ class AnswerErrors:
         rest = _REST * float(np.abs(changes[:, 0]).mean())
         return float(np.hypot(magnitude(change + shifts / duration), rest))
 
-    def _follow_distance(self, step: Step, line: LineOfCenters) -> None:
-        assert step.error is not None
+    def _follow_distance(self, step: Step, error: Array, line: LineOfCenters) -> None:
+        """Take in the distance at the end of a step, where the state has an error (state_size, 2)."""
         distance, size = line.distance_of, line.distance_of(step.state)
-        change = change_of(distance, step.state, step.error(step.end))
+        change = change_of(distance, step.state, error)
         if line.separated:
             self._separation = _time_error(step, step.end, distance)
             # Would it move apart without the error?
+            assert step.error is not None
             before = step.end - _PART * (step.end - step.start)
             state = step.interpolate(before)
             difference = change - change_of(distance, state, step.error(before))
@@ -175,10 +177,9 @@ def _time_error(step: Step, time: float, quantity: Quantity) -> Array:
     return -change_of(quantity, state, step.error(time)) / rate if rate else np.full(2, np.inf)
 
 
-def _transverse_error(step: Step) -> float:
-    """Return the error at the end of a step without what only delays or hastens the motion."""
-    assert step.error is not None
-    error, motion = step.error(step.end)[:, 0], step.state - step.interpolate(step.start)
-    if np.any(motion):
-        error = error - (error @ motion) / (motion @ motion) * motion
+def _transverse_error(step: Step, error: Array) -> float:
+    """Return an error (n,) at the end of a step without what only delays or hastens the motion."""
+    motion = step.state - step.interpolate(step.start)
+    if (square := motion @ motion) > 0:
+        error = error - (error @ motion) / square * motion
     return root_mean_square(error)

@@ -11,9 +11,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 if TYPE_CHECKING:
     from solver.membrane.geometry import Geometry
@@ -39,6 +36,8 @@ def contacts(geometry: Geometry, distance: float) -> NDArray[np.int64]:
     (k, 2)
         Each pair once.
     """
+    from scipy.spatial import cKDTree  # for the reason that `solver.membrane.shapes` gives
+
     points = geometry.points.reshape(2, -1).T
     near = cKDTree(points).query_pairs(distance, output_type="ndarray") // geometry.membranes.points
     return np.unique(near[near[:, 0] < near[:, 1]], axis=0).astype(np.int64)
@@ -59,6 +58,9 @@ def clusters(geometry: Geometry, distance: float) -> Array:
     -------
     (M,)
     """
+    from scipy.sparse import coo_array  # for the reason that `solver.membrane.shapes` gives
+    from scipy.sparse.csgraph import connected_components
+
     count = geometry.membranes.count
     first, second = contacts(geometry, distance).T
     graph = coo_array((np.ones(first.size), (first, second)), shape=(count, count))

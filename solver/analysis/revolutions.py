@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from solver.analysis.settling import has_settled
 from solver.membrane import curve
+from solver.roots import root
 
 if TYPE_CHECKING:
     from solver.flows import ImposedFlow
@@ -251,4 +251,4 @@ def crossing(step: Step, excess: Callable[[Array], float]) -> float:
 
     if excess_at(step.start) >= 0:  # the interpolant may differ from the previous one by the tolerance
         return step.start
-    return float(brentq(excess_at, step.start, step.end, xtol=1e-12 * max(step.end, 1.0)))
+    return root(excess_at, step.start, step.end, 1e-12 * max(step.end, 1.0))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.membrane.spectral import tail
+from solver.membrane.spectral import equispaced_angles, tail
 
 if TYPE_CHECKING:
     from solver.membrane.geometry import Membranes
@@ -32,8 +32,7 @@ def shape_tails(membranes: Membranes, state: Array) -> Array:
     (M,)
         Radians; see `solver.membrane.spectral.tail`.
     """
-    circle = 2 * np.pi * np.arange(membranes.points) / membranes.points
-    return tail(membranes.tangent_angle(state) - circle)
+    return tail(membranes.tangent_angle(state) - equispaced_angles(membranes.points))
 
 
 def spatial_error(tails: Array, age: Array) -> Array:

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from solver.analysis.diagnostics import viscosity_measures
 from solver.analysis.run import Viscosity
@@ -76,6 +75,8 @@ class ViscosityHistory:
         Viscosity or None
             None if nothing was followed in it.
         """
+        from scipy.interpolate import CubicSpline  # for the reason that `solver.membrane.shapes` gives
+
         if not self._times or first >= last:
             return None
         first = max(first, self._times[0])

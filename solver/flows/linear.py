@@ -64,4 +64,5 @@ class LinearFlow(ImposedFlow):
         -------
         (2, P, S)
         """
-        return np.tensordot(self.rate * self.unit_gradient, by_state, axes=1)
+        gradient = self.rate * self.unit_gradient
+        return np.asarray(gradient @ by_state.reshape(2, -1)).reshape(by_state.shape)

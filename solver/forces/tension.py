@@ -258,9 +258,13 @@ class Inextensibility:
         membranes = geometry.membranes
         points, count = membranes.points, membranes.count
         weighted = (2 * np.pi / points) * differentiation(points)  # spacing · ∂/∂s
-        of_tangents = (layer.matrix.reshape(-1, points) @ weighted).reshape(2, count * points, 2, -1)
-        of_tangents *= geometry.tangents.reshape(2, -1)
-        flow = of_tangents[:, :, 0] + of_tangents[:, :, 1]
+        by_vesicle = np.empty((2, count * points, count, points))
+        columns = layer.matrix.reshape(-1, 2, count, points)
+        for vesicle in range(count):
+            forces = (weighted * geometry.tangents[:, vesicle, None]).reshape(2 * points, points)
+            own = columns[:, :, vesicle].reshape(-1, 2 * points)
+            by_vesicle[:, :, vesicle] = (own @ forces).reshape(2, -1, points)
+        flow = by_vesicle.reshape(2, count * points, -1)
         system, turning = geometry.deformation(flow)
         system *= -np.repeat(membranes.spacing, points)[:, None]
         typical = np.trace(system) / (count * points)
@@ -275,7 +279,7 @@ class Inextensibility:
         factor, failed = lapack.dpotrf(system.T, lower=0, overwrite_a=1)
         if failed:
             raise TensionNotFoundError("the tension operator is not positive: the membrane is too distorted")
-        triangle, _ = lapack.dpotri(factor, lower=0, overwrite_c=1)
-        inverse = np.triu(triangle)
-        inverse += np.triu(triangle, 1).T
-        return TensionInverse(np.ascontiguousarray(inverse), shifts), TensionEffect(flow, turning)
+        triangle, _ = lapack.dpotri(factor, lower=0, overwrite_c=1)  # the other one holds zeros
+        inverse = np.add(triangle, triangle.T, order="C")
+        inverse.flat[:: len(inverse) + 1] = np.diagonal(triangle)
+        return TensionInverse(inverse, shifts), TensionEffect(flow, turning)

@@ -7,8 +7,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import KroghInterpolator
-from scipy.special import roots_jacobi
 
 Array = NDArray[np.float64]
 
@@ -30,6 +28,8 @@ class GaussLobatto:
     @cached_property
     def nodes(self) -> Array:
         """The nodes in ascending order, (count,)."""
+        from scipy.special import roots_jacobi  # for the reason that `solver.membrane.shapes` gives
+
         interior = roots_jacobi(self.count - 2, 1, 1)[0] if self.count > 2 else np.empty(0)
         nodes = (1 + np.concatenate([[-1.0], interior, [1.0]])) / 2
         return np.asarray((nodes + 1 - nodes[::-1]) / 2)  # symmetric to the last bit
@@ -42,6 +42,8 @@ class GaussLobatto:
     @cached_property
     def integration(self) -> Array:
         """The matrix of integrals between neighboring nodes from values at all nodes, (count − 1, count)."""
+        from scipy.interpolate import KroghInterpolator  # for the reason that `solver.membrane.shapes` gives
+
         abscissas, weights = np.polynomial.legendre.leggauss(self.count)
         basis = KroghInterpolator(self.nodes, np.eye(self.count))
         points = self.nodes[:-1, None] + self.intervals[:, None] * (1 + abscissas) / 2

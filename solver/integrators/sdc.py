@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import KroghInterpolator
 
 from solver.integrators.collocation import GaussLobatto
 from solver.integrators.control import AdaptiveStep, Attempt, ConservedError, EmbeddedError, ErrorMeasure
@@ -130,6 +129,8 @@ class DeferredCorrection:
         -------
         Attempt
         """
+        from scipy.interpolate import KroghInterpolator  # for the reason that `solver.membrane.shapes` gives
+
         sweeps = _Sweeps(near, size, self._rule)
         values, slopes = sweeps.predict()
         for _ in range(max(self._order - 1, 1)):

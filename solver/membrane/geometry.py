@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from solver.compilation import compiled
 from solver.membrane import curve
-from solver.membrane.spectral import differentiation, integration
+from solver.membrane.spectral import differentiation, equispaced_angles, integration
 from solver.membrane.symmetry import independent_vesicles
 
 if TYPE_CHECKING:
@@ -359,7 +359,7 @@ class Geometry:
     def curvature(self) -> Array:
         """Curvature θ_s, (M, N); positive for a circle."""
         points, wavenumber = self.membranes.points, self.membranes.wavenumber
-        periodic = self.tangent_angle - 2 * np.pi * np.arange(points) / points
+        periodic = self.tangent_angle - equispaced_angles(points)
         return wavenumber * (1 + periodic @ differentiation(points).T)
 
     def arclength_derivative(self, values: Array, order: int = 1) -> Array:

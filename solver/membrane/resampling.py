@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.membrane.spectral import resampled
+from solver.membrane.spectral import equispaced_angles, resampled
 
 if TYPE_CHECKING:
     from solver.membrane.geometry import Membranes
@@ -32,7 +32,7 @@ def resampled_angle(tangent_angle: Array, points: int) -> Array:
     given = tangent_angle.shape[-1]
     if points == given:
         return tangent_angle
-    coarse, fine = (2 * np.pi * np.arange(n) / n for n in (given, points))
+    coarse, fine = (equispaced_angles(n) for n in (given, points))
     return resampled(tangent_angle - coarse, points) + fine
 
 

@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.membrane import curve
+from solver.membrane.spectral import equispaced_angles
+from solver.roots import root
 from solver.scene.ellipses import semi_axes
 
 Array = NDArray[np.float64]
@@ -32,10 +34,8 @@ def of_reduced_area(tangent_angle: Array, reduced_area: float) -> Array:
     (N,)
         Tangent angles.
     """
-    from scipy.optimize import brentq
-
-    circle = 2 * np.pi * np.arange(tangent_angle.size) / tangent_angle.size
-    circle += np.mean(tangent_angle - circle)
+    circle = equispaced_angles(tangent_angle.size)
+    circle = circle + np.mean(tangent_angle - circle)
     deviation = tangent_angle - circle
 
     def excess(scale: float) -> float:
@@ -45,7 +45,7 @@ def of_reduced_area(tangent_angle: Array, reduced_area: float) -> Array:
 
     if np.max(np.abs(deviation)) < 1e-12:
         return tangent_angle
-    return np.asarray(circle + brentq(excess, 0.5, 1.5, xtol=1e-15, rtol=1e-15) * deviation)
+    return np.asarray(circle + root(excess, 0.5, 1.5, 1e-15) * deviation)
 
 
 def ellipse_tangent_angle(reduced_area: float, length: float, angle: float, points: int) -> Array:

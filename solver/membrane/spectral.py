@@ -48,6 +48,22 @@ def wavenumbers(points: int) -> Array:
 
 
 @cache
+def equispaced_angles(points: int) -> Array:
+    """Return α_j = 2πj/points, the tangent angles of a circle.
+
+    Parameters
+    ----------
+    points : int
+
+    Returns
+    -------
+    (points,)
+        Not to be written to.
+    """
+    return _frozen(2 * np.pi * np.arange(points) / points)
+
+
+@cache
 def differentiation(points: int, order: int = 1) -> Array:
     """Return the matrix of d^order/dα^order at α_j = 2πj/points.
 
@@ -181,7 +197,7 @@ def highest_modes(points: int) -> Array:
     (points, 3)
         Not to be written to.
     """
-    alpha = 2 * np.pi * np.arange(points) / points
+    alpha = equispaced_angles(points)
     below = points // 2 - 1
     basis = np.stack([np.cos(below * alpha), np.sin(below * alpha), np.cos((below + 1) * alpha)], axis=1)
     return _frozen(basis / np.linalg.norm(basis, axis=0))

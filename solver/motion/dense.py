@@ -37,9 +37,13 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-def _of_steps() -> deque[tuple[Array, Motion]]:
-    """Return what keeps the last evaluations: of a step's end, and of a probe of its error after it."""
-    return deque(maxlen=2)
+def _of_steps() -> deque[tuple[bytes, Motion]]:
+    """Return what keeps the last evaluations, each by the bytes of its state.
+
+    A step asks again for one that an iteration began with before it failed, and for one that it ended with
+    before its error was probed.
+    """
+    return deque(maxlen=3)
 
 
 @dataclass
@@ -75,7 +79,7 @@ class DenseEquation:
     evaluations: int = field(default=0, init=False)
     recordings: int = field(default=0, init=False)
     _inverse: TensionInverse | None = field(default=None, init=False)
-    _recent: deque[tuple[Array, Motion]] = field(default_factory=_of_steps, init=False)
+    _recent: deque[tuple[bytes, Motion]] = field(default_factory=_of_steps, init=False)
     _assembled: tuple[Geometry, Closeness | None] | None = field(default=None, init=False)
 
     @property
@@ -128,7 +132,7 @@ class DenseEquation:
         -------
         DenseJacobian
         """
-        motion = self._evaluate_for_step(state)
+        motion = self._known(state) or self._evaluate_for_step(state)
         geometry = motion.geometry
         adhesion = None
         if self.adhesion and motion.closeness:
@@ -234,7 +238,7 @@ class DenseEquation:
         self.evaluations += 1
         state = state.copy()  # the integrator may go on in its own array, and the motion is kept
         motion, self._inverse = self._evaluate(state)
-        self._recent.append((state, motion))
+        self._recent.append((state.tobytes(), motion))
         return motion
 
     def _evaluate(self, state: Array) -> tuple[Motion, TensionInverse]:
@@ -262,7 +266,8 @@ class DenseEquation:
 
     def _known(self, state: Array) -> Motion | None:
         """Return the motion in a state in which steps have evaluated it lately."""
-        return next((motion for known, motion in self._recent if np.array_equal(known, state)), None)
+        wanted = state.tobytes()
+        return next((motion for known, motion in self._recent if known == wanted), None)
 
     def _assemble(self, geometry: Geometry) -> Closeness | None:
         """Fill the matrices for a geometry, unless they are filled for it already."""

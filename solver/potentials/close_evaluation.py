@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.compilation import compiled
-from solver.membrane.spectral import logarithm_weights
+from solver.membrane.spectral import equispaced_angles, logarithm_weights
 from solver.potentials.logarithm import logarithm
 from solver.potentials.refinement import LARGEST_REFINED, Refinement, interpolation_to, refined_points
 from solver.potentials.stokeslets import stokeslets
@@ -56,7 +56,7 @@ def logarithm_correction(points: int) -> Array:
     (points, points)
         Not to be written to.
     """
-    alpha = 2 * np.pi * np.arange(points) / points
+    alpha = equispaced_angles(points)
     sine = np.sin((alpha[:, None] - alpha) / 2)
     np.fill_diagonal(sine, 0.5)  # makes the logarithm vanish there
     weights = logarithm_weights(points) * points / (2 * np.pi)

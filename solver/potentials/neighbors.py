@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from solver.compilation import compiled
 from solver.membrane.spectral import interpolation, interpolations
@@ -72,6 +71,8 @@ class Neighbors:
     """
 
     def __init__(self, geometry: Geometry, reach: float) -> None:
+        from scipy.spatial import cKDTree  # for the reason that `solver.membrane.shapes` gives
+
         membranes = geometry.membranes
         self._points, self._curves = membranes.points, membranes.count
         centers, radii = geometry.centers, geometry.radii

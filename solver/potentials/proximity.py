@@ -61,6 +61,12 @@ def all_pairs(count: int, curves: int) -> NDArray[np.int64]:
     return np.argwhere(np.ones((count, curves)))
 
 
+@cache
+def _no_limits(curves: int) -> Array:
+    """Return limits that leave out a curve itself only, which is at no finite distance."""
+    return np.full(curves, np.inf)
+
+
 class Closeness:
     """Distances between all membranes of a geometry.
 
@@ -103,8 +109,7 @@ class Closeness:
         while factor < MAXIMUM_FACTOR and factor * self.nearest < ratio:
             factor *= 2
         count, curves, points = self.distances.shape
-        # No curve is at a finite distance from itself.
-        limits = np.full(curves, np.inf) if limits is None else limits
+        limits = _no_limits(curves) if limits is None else limits
         pairs = all_pairs(count, curves)
         groups, rows, starts = group_targets(pairs, self.distances.reshape(-1, points), ratio, limits)
         return Refinement(groups, rows, starts, interpolations(self._points, factor))

@@ -14,8 +14,9 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from scipy.optimize import brentq
 from scipy.special import gammaln, kve
+
+from solver.roots import root
 
 
 def _log_error(order: float, z: float) -> float:
@@ -57,5 +58,5 @@ def required_ratio(order: float, tolerance: float) -> float:
     float
     """
     lowest = max(order - 0.5, 0.1)  # below it the alias is not small and the estimate says nothing
-    z = brentq(lambda z: _log_error(order, z) - np.log(tolerance), lowest, 1e3)
-    return float(z) / (2 * np.pi)
+    z = root(lambda z: _log_error(order, z) - np.log(tolerance), lowest, 1e3)
+    return z / (2 * np.pi)

@@ -41,6 +41,12 @@ class Refinement(NamedTuple):
     starts: Indices
     interpolations: Array
 
+    @property
+    def largest_factor(self) -> int:
+        """The largest factor that the matrices allow; no group has a larger one."""
+        rows, points = self.interpolations.shape
+        return rows // points // 2 + 1
+
 
 @compiled
 def refinement_factors(distance_per_spacing: Array, ratio: float) -> Indices:

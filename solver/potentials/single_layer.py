@@ -111,7 +111,7 @@ class SingleLayer:
         if refinement:
             refinement = within(refinement, own, size)
             refine_single_layer(geometry.curve_points, refinement, components, own.start)
-            if refinement.groups[:, 2].max(initial=1) > LARGEST_REFINED:
+            if refinement.largest_factor > LARGEST_REFINED:
                 close_single_layer(
                     geometry.curve_points,
                     geometry.curve_tangents,

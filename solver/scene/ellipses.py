@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.roots import root
+
 if TYPE_CHECKING:
     from solver.scene.vesicle import Vesicle
 
@@ -46,7 +48,6 @@ def semi_axes(reduced_area: float, length: float) -> tuple[float, float]:
     major : float
     minor : float
     """
-    from scipy.optimize import brentq
     from scipy.special import ellipe
 
     if reduced_area == 1.0:
@@ -56,7 +57,7 @@ def semi_axes(reduced_area: float, length: float) -> tuple[float, float]:
     def excess(aspect: float) -> float:
         return float(np.pi**2 * aspect / (4 * ellipe(1 - aspect**2) ** 2) - reduced_area)
 
-    aspect = brentq(excess, 1e-9, 1.0, xtol=1e-16, rtol=1e-15)
+    aspect = root(excess, 1e-9, 1.0, 1e-16)
     major = length / (4 * ellipe(1 - aspect**2))
     return major, major * aspect
 

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from solver.forces.tension import TensionNotFoundError
+from solver.roots import root
 from solver.steady_states.branch import Branch, BranchPoint
 from solver.steady_states.newton import NoSteadyStateError, least_squares, steady_state
 from solver.steady_states.stability import Perturbations
@@ -303,7 +303,7 @@ class Continuation:
         def at(part: float) -> float:
             return function(ends[part] if part in ends else self._ahead(first, part))
 
-        return self._ahead(first, float(brentq(at, 0.0, distance, xtol=_ROOT, rtol=1e-12)))
+        return self._ahead(first, root(at, 0.0, distance, _ROOT))
 
     def _distance(self, first: BranchPoint, last: BranchPoint) -> float:
         difference = self._unknowns(last) - self._unknowns(first)

@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eig, eigvals
 
+from solver.membrane.spectral import equispaced_angles
+
 if TYPE_CHECKING:
     from solver.membrane.geometry import Membranes
     from solver.steady_states.steady_equations import SteadyEquations
@@ -188,7 +190,7 @@ def _perturbations(determining: Array, membranes: Membranes) -> Array:
 
 def _smooth_modes(points: int) -> Array:
     """Return an orthonormal basis of the modes that are perturbed, (points, k)."""
-    angle = 2 * np.pi * np.arange(points) / points
+    angle = equispaced_angles(points)
     highest = min(points // 2 - 2, _HIGHEST_WAVENUMBER)
     waves = np.arange(1, highest + 1) * angle[:, None]
     constant = np.full((points, 1), 1 / np.sqrt(points))
