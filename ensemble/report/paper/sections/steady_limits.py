@@ -148,10 +148,29 @@ def _fold(branch: SteadyBranch | None) -> float | None:
     return branch.folds[0].parameter if branch is not None and branch.folds else None
 
 
-def _limit(
+def compare_limit(
     quantity: str, known: Value, value: float | None, case: Case, bracket: Interval | None = None
 ) -> Comparison:
-    """Return a row: the limit to nine digits, beside the bracket of bisection."""
+    """Set a limit beside what is published and the bracket of bisection.
+
+    Parameters
+    ----------
+    quantity : str
+        What is compared.
+    known : float, (float, float), str or None
+        What is published.
+    value : float or None
+        The limit; None if the branch has none.
+    case : Case
+        The run from whose end the branch starts.
+    bracket : (float, float) or None
+        Of bisection.
+
+    Returns
+    -------
+    Comparison
+        Its note has nine digits of the limit, and says whether it lies inside the bracket, or why not.
+    """
     notes = [] if value is None else [f"computed {value:.9g}"]
     if bracket is not None:
         notes.append(f"bisection {bracket[0]:.5g} to {bracket[1]:.5g}{_place(value, bracket)}")
@@ -188,7 +207,7 @@ def _trap_comparisons(results: Results, study: StudyCase, areas: tuple[float, ..
         case = _side_by_side(area)
         fold = _fold(_branch(results, case, _RATE, Limits(np.inf)))
         name = f"rate at which side by side ends (fold), ΔA = {area:g}"
-        yield _limit(name, known.get(area), fold, case, results.brackets(study).get(area))
+        yield compare_limit(name, known.get(area), fold, case, results.brackets(study).get(area))
 
 
 def _tip_to_tip_comparisons(results: Results, areas: tuple[float, ...]) -> Iterator[Comparison]:
@@ -204,8 +223,10 @@ def _tip_to_tip_comparisons(results: Results, areas: tuple[float, ...]) -> Itera
         lower = _branch(results, case, _RATE, Limits(_LEAST_RATE), near)
         upper = _branch(results, case, _RATE, Limits(np.inf), near)
         crossing = max((point.parameter for point in lower.crossings), default=None) if lower else None
-        yield _limit(f"rate at which tip to tip begins (crossing), ΔA = {area:g}", None, crossing, case)
-        yield _limit(f"rate at which tip to tip ends (fold), ΔA = {area:g}", None, _fold(upper), case)
+        yield compare_limit(
+            f"rate at which tip to tip begins (crossing), ΔA = {area:g}", None, crossing, case
+        )
+        yield compare_limit(f"rate at which tip to tip ends (fold), ΔA = {area:g}", None, _fold(upper), case)
 
 
 def _treading_comparisons(
@@ -215,7 +236,7 @@ def _treading_comparisons(
         case = _treading(area)
         fold = _fold(_branch(results, case, _CONTRAST, Limits(np.inf)))
         name = f"contrast at which treading ends (fold), ΔA = {area:g} (published: Keller and Skalak)"
-        yield _limit(name, keller_skalak(area), fold, case, results.brackets(study).get(area))
+        yield compare_limit(name, keller_skalak(area), fold, case, results.brackets(study).get(area))
 
 
 _TEXT = (

@@ -13,7 +13,7 @@ import pytest
 from scipy.special import gamma
 
 from ensemble.figures import save
-from ensemble.report.paper.case import StudyCase
+from ensemble.report.paper.case import Case, StudyCase
 from ensemble.report.paper.comparison import Comparison
 from ensemble.report.paper.least_squares import straight_line
 from ensemble.report.paper.results import Results
@@ -27,6 +27,7 @@ from ensemble.report.paper.sections import (
     unequal_vesicles,
 )
 from ensemble.report.paper.sections.shear_cases import ShearDoublet
+from ensemble.report.paper.sections.steady_limits import compare_limit
 from ensemble.search.boundary import Boundary, BoundaryPoint
 from ensemble.store import Store
 from solver.analysis.run import Energy, Outcome, Run, Viscosity
@@ -244,3 +245,16 @@ def test_lines_through_brackets_are_bounded_by_their_corners() -> None:
     intercepts, slopes = critical_hamaker.lines_through({0.5: (1.0, 2.0), 1.0: (3.0, 3.5), 1.5: (4.0, 6.0)})
     assert slopes == pytest.approx((2.0, 5.0))  # (0.5, 2) to (1, 3); (0.5, 1) to (1, 3.5)
     assert intercepts == pytest.approx((-1.5, 1.0))
+
+
+@pytest.mark.parametrize(
+    ("limit", "place"),
+    [(0.0928, "inside"), (0.0940, "0.75 % above"), (0.0920, "0.43 % below"), (None, "0.0924 to 0.0933")],
+)
+def test_a_limit_is_inside_the_bracket_of_bisection_or_it_is_said_why_not(
+    limit: float | None, place: str
+) -> None:
+    row = compare_limit("rate", (0.09, 0.1), limit, Case.of("doublet-trap", {}), (0.0924, 0.0933))
+    assert place.replace(" %", "%") in row.note
+    assert row.computed == limit
+    assert ("computed 0.0" in row.note) is (limit is not None)
