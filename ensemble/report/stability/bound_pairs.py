@@ -33,7 +33,7 @@ _OTHERS: tuple[tuple[str, dict[str, Any]], ...] = (
         (f"viscosity contrast {contrast:g}", {"vesicles.viscosity_contrast": contrast})
         for contrast in (0.5, 2.0)
     ),
-    *((f"distance {distance:g}", {"adhesion.distance": distance}) for distance in (0.1, 0.2)),
+    *((f"distance {distance:g}", {"adhesion.distance": distance}) for distance in (0.2, 0.3)),
 )
 _STUDY, _BEYOND = "default study", "beyond"
 _HORIZON = 1600.0  # that of the study
