@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from solver.analysis.diagnostics import viscosity_measures
 from solver.analysis.run import Viscosity
+from solver.analysis.spline import spline_integral
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -75,12 +76,10 @@ class ViscosityHistory:
         Viscosity or None
             None if nothing was followed in it.
         """
-        from scipy.interpolate import CubicSpline  # for the reason that `solver.membrane.shapes` gives
-
         if not self._times or first >= last:
             return None
         first = max(first, self._times[0])
-        integral = CubicSpline(self._times, self._values).integrate(first, last)
+        integral = spline_integral(np.array(self._times), np.array(self._values), first, last)
         parts = dict(zip(self._measures, (integral / (last - first)).tolist(), strict=True))
         return viscosity_of(parts)
 
