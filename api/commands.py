@@ -76,7 +76,7 @@ def worker(  # numpydoc ignore=PR01
         threading.Thread(target=wait_for_end_of_input, daemon=True).start()
     settings = _settings(store)
     with Store.open(store) as opened, Database.open(settings.database_url, opened.path) as database:
-        Worker(Jobs(database, opened.path), opened.path).run(stop)
+        Worker(Jobs(database, opened.path), opened, settings.maximum_memory).run(stop)
 
 
 def token(  # numpydoc ignore=PR01

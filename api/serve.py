@@ -24,7 +24,7 @@ from api.database.service_database import Database, look_up_for
 from api.http.bounded_protocol import ConnectionLimits, bounded_protocol
 from api.http.rate_limits import RateLimits
 from api.jobs.job_queue import Jobs
-from api.jobs.submissions import Submissions
+from api.jobs.submissions import Submissions, job_limits
 from api.routes.service import Service
 from api.settings import Settings
 from ensemble.config.documents import preset_names
@@ -98,7 +98,7 @@ def open_service(settings: Settings) -> Iterator[Service]:
             settings=settings,
             store=store,
             jobs=Jobs(database, store.path),
-            submissions=Submissions(settings.maximum_cost, settings.maximum_recorded),
+            submissions=Submissions(job_limits(settings)),
             # Kept for less time than a listener waits, so no listener receives an older state than before.
             watched_jobs=TTLCache(WATCHED_JOBS, ttl=settings.event_seconds / 2),
             tokens=tokens,

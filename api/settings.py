@@ -34,6 +34,10 @@ def _parsable_addresses(text: str) -> str:
     return text
 
 
+def _physical_memory() -> int:
+    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+
+
 Rate = Annotated[str, AfterValidator(_parsable_rate)]
 Addresses = Annotated[str, AfterValidator(_parsable_addresses)]
 JOBS_DATABASE = "jobs.sqlite"  # in the store, unless a database server is set
@@ -65,6 +69,12 @@ class Settings(BaseSettings):
     )
     maximum_recorded: float = Field(
         1e9, gt=0, description="Most numbers that a job may record, over all runs; each takes up to 8 bytes."
+    )
+
+    maximum_memory: int = Field(
+        default_factory=_physical_memory,
+        ge=1 << 29,
+        description="Most memory of a job, in bytes, over all its processes; each gets an equal part.",
     )
 
     body_bytes: int = Field(1 << 18, ge=1, description="Largest body of a request, in bytes.")

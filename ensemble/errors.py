@@ -85,6 +85,9 @@ def told_in_a_line(error: BaseException) -> str | None:
     str or None
         None for any other error, which is one of this package and shown in full.
     """
+    if isinstance(error, MemoryError):  # first of all: nothing can be imported any more
+        return f"there is not enough memory ({str(error) or 'for a small object'})"
+
     from sqlalchemy.exc import DBAPIError
 
     if isinstance(error, DBAPIError):

@@ -83,6 +83,12 @@ class JobRow(ServiceTable):
         Name of that worker.
     expires : datetime or None
         End of the lease.
+    reached : float
+        How far it has come, on the scale of `ensemble.display.progress_line.ProgressLine`.
+    crashes : int
+        Number of attempts that have ended without an answer since it last came further.
+    retry : datetime or None
+        When it may be tried again; None: now.
     """
 
     __tablename__ = "jobs"
@@ -91,7 +97,7 @@ class JobRow(ServiceTable):
         UniqueConstraint("owner", "idempotency_key"),
         Index(None, "owner", "number"),
         Index(None, "status", "number"),
-        Index(None, "status", "owner", "number"),
+        Index(None, "status", "owner", "number", "retry"),
         {"sqlite_autoincrement": True},
     )
 
@@ -112,6 +118,9 @@ class JobRow(ServiceTable):
     attempts: Mapped[int]
     worker: Mapped[str | None]
     expires: Mapped[datetime | None]
+    reached: Mapped[float] = mapped_column(server_default="0")
+    crashes: Mapped[int] = mapped_column(server_default="0")
+    retry: Mapped[datetime | None]
     created: Mapped[datetime]
     started: Mapped[datetime | None]
     finished: Mapped[datetime | None]

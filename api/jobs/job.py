@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Annotated, Any
 
@@ -121,7 +121,31 @@ class Lease:
         As it was leased.
     document : mapping
         The question that it answers, in full.
+    reached : float
+        How far earlier attempts have come, on the scale of `ensemble.display.progress_line.ProgressLine`.
+    crashes : int
+        How many of them have ended without an answer since the job last came further.
     """
 
     job: Job
     document: Mapping[str, Any]
+    reached: float
+    crashes: int
+
+    def at(self, reached: float) -> Lease:
+        """Return the lease of an attempt that has come so far; if that is further, earlier crashes are past.
+
+        Parameters
+        ----------
+        reached : float
+            How far this attempt has come.
+
+        Returns
+        -------
+        Lease
+        """
+        return replace(self, reached=reached, crashes=0) if reached > self.reached else self
+
+    def crashed(self) -> Lease:
+        """Return the lease of an attempt that has ended without an answer."""
+        return replace(self, crashes=self.crashes + 1)

@@ -314,8 +314,9 @@ class Jobs:
     def lease(self, worker: str) -> Lease | None:
         """Lease the next job to a worker.
 
-        It is the oldest job of the owner who has the fewest running.  A job whose worker has let its lease
-        run out, or is known to have died, is available again.
+        It is the oldest job of the owner who has the fewest running, among those that may be tried now.
+        A job whose worker has let its lease run out, or is known to have died, is available again; that
+        counts as a crash, because a job may take its worker along.
 
         Parameters
         ----------
@@ -332,7 +333,7 @@ class Jobs:
         expires = moment + timedelta(seconds=LEASE_SECONDS)
         take = (
             update(JobRow)
-            .where(JobRow.number == _next_number(), JobRow.status == JobStatus.ACCEPTED)
+            .where(JobRow.number == _next_number(moment), JobRow.status == JobStatus.ACCEPTED)
             .values(
                 status=JobStatus.RUNNING,
                 message="starting",
@@ -342,7 +343,7 @@ class Jobs:
                 started=func.coalesce(JobRow.started, literal(moment, JobRow.started.type)),
                 updated=moment,
             )
-            .returning(*_JOB_COLUMNS, JobRow.document)
+            .returning(*_JOB_COLUMNS, JobRow.document, JobRow.reached, JobRow.crashes)
         )
         with self._database.begin() as connection:
             dead = [name for name in connection.scalars(running) if name is not None and has_died(name)]
@@ -352,10 +353,13 @@ class Jobs:
                     JobRow.status == JobStatus.RUNNING, or_(JobRow.expires < moment, JobRow.worker.in_(dead))
                 )
                 .values(_waiting("its worker was lost; waiting for another one", moment))
+                .values(crashes=JobRow.crashes + 1)
             )
             connection.execute(lost)
             row = connection.execute(take).one_or_none()
-        return None if row is None else Lease(Job.model_validate(row), row.document)
+        if row is None:
+            return None
+        return Lease(Job.model_validate(row), row.document, row.reached, row.crashes)
 
     def heartbeat(self, lease: Lease, progress: int, message: str) -> bool:
         """Renew a lease and record how far the job has come.
@@ -379,6 +383,8 @@ class Jobs:
             _leased(lease).values(
                 progress=case((JobRow.progress < progress, progress), else_=JobRow.progress),
                 message=message,
+                reached=lease.reached,
+                crashes=lease.crashes,
                 expires=moment + timedelta(seconds=LEASE_SECONDS),
                 updated=moment,
             )
@@ -403,7 +409,7 @@ class Jobs:
         """
         return self._change(self._ended(_leased(lease), status, message))
 
-    def give_back(self, lease: Lease, message: str) -> bool:
+    def give_back(self, lease: Lease, message: str, seconds: float = 0.0) -> bool:
         """Make a job available to other workers again.
 
         Parameters
@@ -412,13 +418,21 @@ class Jobs:
             Of this worker.
         message : str
             Says why.
+        seconds : float
+            How long it waits before it is tried again.  Meanwhile other jobs of its owner have their turn.
 
         Returns
         -------
         bool
             False if the job is no longer this worker's; then nothing is changed.
         """
-        return self._change(_leased(lease).values(_waiting(message, self._clock())))
+        moment = self._clock()
+        retry = moment + timedelta(seconds=seconds) if seconds else None
+        return self._change(
+            _leased(lease)
+            .values(_waiting(message, moment))
+            .values(retry=retry, reached=lease.reached, crashes=lease.crashes)
+        )
 
     def log_path(self, job: Job) -> Path:
         """Return the file of what a job's processes have written to standard error.
@@ -452,10 +466,10 @@ def _fingerprint(question: Question[Any], ranks: int, seconds: float) -> str:
     return hashlib.sha256(request.encode()).hexdigest()
 
 
-def _next_number() -> ScalarSelect[int]:
+def _next_number(moment: datetime) -> ScalarSelect[int]:
     waiting = (
         select(JobRow.owner, func.min(JobRow.number).label("number"))
-        .where(JobRow.status == JobStatus.ACCEPTED)
+        .where(JobRow.status == JobStatus.ACCEPTED, or_(JobRow.retry.is_(None), JobRow.retry <= moment))
         .group_by(JobRow.owner)
         .subquery()
     )

@@ -13,6 +13,7 @@ from pydantic_core import from_json
 from starlette.concurrency import run_in_threadpool
 
 from api.jobs.job import KindName
+from api.settings import Settings
 from ensemble.config.documents import preset_document
 from ensemble.config.overrides import override
 from ensemble.config.validation import describe
@@ -85,8 +86,12 @@ class Estimate(BaseModel):
         Numbers that are recorded, over all runs.
     most_recorded : float
         The most that a job may record.
+    memory : float
+        Bytes that each process of the job needs.
+    most_memory : float
+        The most that its processes may use together.
     accepted : bool
-        Whether the job keeps both limits.
+        Whether the job keeps all limits, on one process.
     """
 
     runs: int
@@ -94,20 +99,53 @@ class Estimate(BaseModel):
     maximum: float
     recorded: float
     most_recorded: float
+    memory: float
+    most_memory: float
     accepted: bool
 
 
-def estimate(question: Question[Any], maximum: float, most_recorded: float) -> Estimate:
+@dataclass(frozen=True)
+class JobLimits:
+    """What a job may cost, whatever it asks.
+
+    Attributes
+    ----------
+    cost : float
+        Points × vesicles × time to simulate, over all runs.
+    recorded : float
+        Numbers that it records, over all runs.
+    memory : float
+        Bytes that its processes use together.
+    """
+
+    cost: float
+    recorded: float
+    memory: float
+
+
+def job_limits(settings: Settings) -> JobLimits:
+    """Return what the settings allow a job to cost.
+
+    Parameters
+    ----------
+    settings : Settings
+
+    Returns
+    -------
+    JobLimits
+    """
+    return JobLimits(settings.maximum_cost, settings.maximum_recorded, settings.maximum_memory)
+
+
+def estimate(question: Question[Any], limits: JobLimits) -> Estimate:
     """Compare the cost of a question with the most that a job may cost.
 
     Parameters
     ----------
     question : Question
         What the job answers.
-    maximum : float
-        The most that a job may cost.
-    most_recorded : float
-        The most numbers that it may record.
+    limits : JobLimits
+        The most that it may cost.
 
     Returns
     -------
@@ -125,10 +163,14 @@ def estimate(question: Question[Any], maximum: float, most_recorded: float) -> E
     return Estimate(
         runs=cost.runs,
         cost=min(cost.work, sys.float_info.max),  # JSON has no word for infinity
-        maximum=maximum,
+        maximum=limits.cost,
         recorded=min(cost.recorded, sys.float_info.max),
-        most_recorded=most_recorded,
-        accepted=cost.work <= maximum and cost.recorded <= most_recorded,
+        most_recorded=limits.recorded,
+        memory=min(cost.memory, sys.float_info.max),
+        most_memory=limits.memory,
+        accepted=(
+            cost.work <= limits.cost and cost.recorded <= limits.recorded and cost.memory <= limits.memory
+        ),
     )
 
 
@@ -177,14 +219,12 @@ class Submissions:
 
     Parameters
     ----------
-    maximum_cost : float
+    limits : JobLimits
         The most that a job may cost.
-    maximum_recorded : float
-        The most numbers that it may record.
     """
 
-    def __init__(self, maximum_cost: float, maximum_recorded: float) -> None:
-        self._limits = maximum_cost, maximum_recorded
+    def __init__(self, limits: JobLimits) -> None:
+        self._limits = limits
         self._cache: LRUCache[bytes, CheckedSubmission] = LRUCache(MOST_CACHED)
 
     async def read(self, body: bytes) -> CheckedSubmission:
@@ -215,7 +255,7 @@ class Submissions:
     def _check(self, body: bytes) -> CheckedSubmission:
         submission = read_submission(body)
         question = submitted_question(submission)
-        return CheckedSubmission(submission, question, estimate(question, *self._limits))
+        return CheckedSubmission(submission, question, estimate(question, self._limits))
 
 
 def read_submission(body: bytes) -> SubmissionFields:

@@ -156,6 +156,14 @@ def _resources(settings: Settings, checked: CheckedSubmission) -> tuple[int, flo
             recorded=cost.recorded,
             most_recorded=cost.most_recorded,
         )
+    if cost.memory > cost.most_memory:
+        raise Problem(
+            HTTPStatus.UNPROCESSABLE_ENTITY,
+            f"memory: {cost.memory:.3g} bytes — must be at most {cost.most_memory:.3g}; "
+            "a viscosity contrast needs the square of points × vesicles",
+            memory=cost.memory,
+            most_memory=cost.most_memory,
+        )
     if not cost.accepted:
         raise Problem(
             HTTPStatus.UNPROCESSABLE_ENTITY,
@@ -164,10 +172,16 @@ def _resources(settings: Settings, checked: CheckedSubmission) -> tuple[int, flo
             cost=cost.cost,
             maximum=cost.maximum,
         )
-    ranks = checked.submission.ranks or (settings.maximum_ranks if checked.question.has_many_runs else 1)
+    most_ranks = min(settings.maximum_ranks, int(cost.most_memory // cost.memory))
+    ranks = checked.submission.ranks or (most_ranks if checked.question.has_many_runs else 1)
     seconds = checked.submission.seconds or settings.maximum_seconds
     if ranks > settings.maximum_ranks:
         raise BadInput(f"ranks: {ranks} — must be at most {settings.maximum_ranks}")
+    if ranks > most_ranks:
+        raise BadInput(
+            f"ranks: {ranks} — must be at most {most_ranks}: each needs {cost.memory:.3g} bytes of the "
+            f"{cost.most_memory:.3g} that a job may use"
+        )
     if seconds > settings.maximum_seconds:
         raise BadInput(f"seconds: {seconds:g} — must be at most {settings.maximum_seconds:g}")
     return ranks, seconds

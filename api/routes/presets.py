@@ -6,7 +6,7 @@ from fastapi import APIRouter
 from pydantic import TypeAdapter
 
 from api.http.paging import CollectionPage
-from api.jobs.submissions import PresetDocument, estimate
+from api.jobs.submissions import PresetDocument, estimate, job_limits
 from api.routes.service import Reader
 from api.settings import Settings
 from ensemble.config.documents import preset_document, preset_names
@@ -46,5 +46,5 @@ def _preset(name: str, settings: Settings) -> PresetDocument:
         name=name,
         kind=question.kind,
         document=document,
-        estimate=estimate(question, settings.maximum_cost, settings.maximum_recorded),
+        estimate=estimate(question, job_limits(settings)),
     )

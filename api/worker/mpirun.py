@@ -11,22 +11,25 @@ import threading
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import IO, TextIO
+from typing import IO
 
 from pydantic import ValidationError
 
+from api.worker.job_log import JobLog
 from ensemble.display.progress_line import ProgressLine
 from ensemble.errors import BadInput
 
 _END_SECONDS = 5.0
 
 
-def mpirun_command(ranks: int, arguments: Sequence[str]) -> list[str]:
-    """Return the command that runs `ensemble` on several ranks, at low priority.
+def mpirun_command(ranks: int, memory: int, arguments: Sequence[str]) -> list[str]:
+    """Return the command that runs `ensemble` on several ranks, at low priority and with limited memory.
 
     Parameters
     ----------
     ranks : int
+    memory : int
+        Bytes that each rank may use.
     arguments : sequence of str
         Of `ensemble`.
 
@@ -44,7 +47,17 @@ def mpirun_command(ranks: int, arguments: Sequence[str]) -> list[str]:
     if mpirun is None:
         raise BadInput("mpirun: there is none on the PATH (the extra 'mpich' brings one)")
     # -P: a folder with the name of a package, where the service was started, must not be imported instead.
-    return [mpirun, "-n", str(ranks), sys.executable, "-P", "-m", "api.worker.background", *arguments]
+    return [
+        mpirun,
+        "-n",
+        str(ranks),
+        sys.executable,
+        "-P",
+        "-m",
+        "api.worker.background",
+        str(memory),
+        *arguments,
+    ]
 
 
 class Process(AbstractContextManager["Process"]):
@@ -56,20 +69,17 @@ class Process(AbstractContextManager["Process"]):
     ----------
     command : sequence of str
         Program and arguments.
-    log : Path
-        Standard error is appended to this file.
+    log : JobLog
+        Takes standard error.
 
     Attributes
     ----------
     progress : ProgressLine
         The latest one that the command has written to standard error.
-    last_message : str
-        The latest other line that it has written there.
     """
 
-    def __init__(self, command: Sequence[str], log: Path) -> None:
-        self.progress = ProgressLine(fraction=0.0, message="starting")
-        self.last_message = ""
+    def __init__(self, command: Sequence[str], log: JobLog) -> None:
+        self.progress = ProgressLine(fraction=0.0, message="starting", reached=0.0)
         self._output: IO[str] = tempfile.TemporaryFile("w+", encoding="utf-8")  # noqa: SIM115
         self._watcher = subprocess.Popen(
             [sys.executable, "-P", "-m", "api.worker.watcher", *command],
@@ -120,21 +130,18 @@ class Process(AbstractContextManager["Process"]):
         self._reader.join(_END_SECONDS)
         self._output.close()
 
-    def _read(self, log: Path) -> None:
+    def _read(self, log: JobLog) -> None:
         assert self._watcher.stderr is not None
-        with self._watcher.stderr as lines, log.open("a", encoding="utf-8") as file:
+        with self._watcher.stderr as lines:
             for line in lines:
-                self._record(line, file)
+                log.add(self._logged(line))
 
-    def _record(self, line: str, log: TextIO) -> None:
+    def _logged(self, line: str) -> str:
         try:
             self.progress = ProgressLine.model_validate_json(line)
         except ValidationError:
-            self.last_message = line.strip() or self.last_message
-            log.write(line)
-        else:
-            log.write(f"{self.progress.fraction:4.0%}  {self.progress.message}\n")
-        log.flush()
+            return line
+        return f"{self.progress.fraction:4.0%}  {self.progress.message}\n"
 
 
 def _environment(environment: Mapping[str, str]) -> dict[str, str]:

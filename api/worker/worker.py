@@ -1,28 +1,44 @@
-"""The worker: leases one job after the other and has `mpirun` carry it out."""
+"""The worker: leases one job after the other and has `mpirun` carry it out.
+
+Only what a command prints as its answer, with the status of an answer, decides a job.  Every other end is
+trouble, and the job is tried again: its processes were killed, or the disk, the database or the memory failed
+them.  What is in the store is not run again.
+"""
 
 from __future__ import annotations
 
 import json
 import logging
+import signal
 import threading
 import time
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
+from typing import Concatenate, ParamSpec
 
 import tomli_w
 
 from api.jobs.job import JobStatus, Lease
 from api.jobs.job_queue import Jobs
 from api.jobs.worker_identity import own_identity
+from api.worker.delays import growing_delay
+from api.worker.job_log import JobLog
 from api.worker.mpirun import Process, mpirun_command
-from ensemble.questions import kind_named
+from ensemble.questions import INCOMPLETE_STATUS, kind_named
+from ensemble.store import Store
+from ensemble.store.sql_database import UNUSABLE, reason
 
 POLL_SECONDS = 0.5
 HEARTBEAT_SECONDS = 0.5
-MAXIMUM_ATTEMPTS = 100
+MAXIMUM_CRASHES = 8  # of a job at the same point
+LONGEST_DELAY = 128.0  # before a job is tried again, in seconds
+LONGEST_WAIT = 10.0  # before the database or the disk is tried again, in seconds
 
-# Exit statuses with which a command ends by itself: complete, incomplete, refused.
-_OWN_STATUSES = (0, 1, 2)
+# Exit statuses with which a command answers, and what becomes of the job.
+ANSWERS: Mapping[int, JobStatus] = {0: JobStatus.SUCCEEDED, INCOMPLETE_STATUS: JobStatus.FAILED}
+TROUBLE = (*UNUSABLE, OSError)
+
+Arguments = ParamSpec("Arguments")
 
 log = logging.getLogger(__name__)
 
@@ -50,45 +66,63 @@ class Worker:
     ----------
     jobs : Jobs
         The queue.
-    store : Path
-        Directory of the store that keeps runs and answers.
+    store : Store
+        It keeps runs and answers.
+    memory : int
+        Bytes that the processes of a job may use together.
     """
 
-    def __init__(self, jobs: Jobs, store: Path) -> None:
+    def __init__(self, jobs: Jobs, store: Store, memory: int) -> None:
         self._jobs = jobs
         self._store = store
+        self._memory = memory
         self._identity = own_identity()
 
     def run(self, stop: threading.Event) -> None:
         """Work until an event is set; a job that is not finished by then is given back.
+
+        While the store or the database cannot be used no job is leased.
 
         Parameters
         ----------
         stop : threading.Event
             Set to stop.
         """
+        tries = 0
         while not stop.is_set():
-            lease = self._jobs.lease(self._identity)
+            try:
+                self._store.require_usable()
+                lease = self._jobs.lease(self._identity)
+            except TROUBLE as error:
+                tries += 1
+                log.warning("waiting: the store or the database cannot be used (%s)", reason(error))
+                stop.wait(growing_delay(tries, LONGEST_WAIT))
+                continue
+            tries = 0
             if lease is None:
                 stop.wait(POLL_SECONDS)
+            elif lease.crashes >= MAXIMUM_CRASHES:  # the last one took its worker along
+                self._give_up(lease, stop)
             else:
                 self._carry_out(lease, stop)
 
     def _carry_out(self, lease: Lease, stop: threading.Event) -> None:
         job = lease.job
-        if job.attempts > MAXIMUM_ATTEMPTS:
-            self._finish(lease, JobResult(JobStatus.FAILED, f"given up: cut short {MAXIMUM_ATTEMPTS} times"))
-            return
         log.info("job %s: attempt %d", job.id, job.attempts)
-        with Process(mpirun_command(job.ranks, self._arguments(lease)), self._jobs.log_path(job)) as process:
+        try:
+            command = mpirun_command(job.ranks, self._memory // job.ranks, self._arguments(lease))
+        except OSError as error:
+            self._try_again_later(lease, stop, f"could not be started ({error.strerror})")
+            return
+        with Process(command, self._log(lease)) as process:
             status = self._wait(process, lease, stop)
             if status is None:
                 return
-            if status in _OWN_STATUSES:
-                self._finish(lease, job_result(job.kind, status, process.output(), process.last_message))
-            else:
-                log.warning("job %s: cut short with status %d", job.id, status)
-                self._jobs.give_back(lease, "its processes were killed; waiting for another attempt")
+            result = job_result(job.kind, status, process.output())
+            if result is not None:
+                self._finish(lease, stop, result)
+                return
+        self._try_again_later(lease.at(process.progress.reached), stop, f"ended {_in_words(status)}")
 
     def _wait(self, process: Process, lease: Lease, stop: threading.Event) -> int | None:
         """Wait for the end of an attempt and return its exit status; None if it has to be ended before."""
@@ -97,18 +131,46 @@ class Worker:
         while (status := process.wait(HEARTBEAT_SECONDS)) is None:
             if stop.is_set():
                 process.end()
-                self._jobs.give_back(lease, "its worker was stopped; waiting for another one")
+                message = "its worker was stopped; waiting for another one"
+                self._record(stop, self._jobs.give_back, lease.at(process.progress.reached), message)
                 return None
             if time.monotonic() > deadline:
                 process.end()
                 message = f"stopped at its time limit, {job.seconds:g} s"
-                self._finish(lease, JobResult(JobStatus.FAILED, message))
+                self._finish(lease, stop, JobResult(JobStatus.FAILED, message))
                 return None
-            progress = process.progress
-            if not self._jobs.heartbeat(lease, int(100 * progress.fraction), progress.message):
+            if not self._is_still_ours(lease, process):
                 log.info("job %s: no longer this worker's", job.id)
                 return None
         return status
+
+    def _is_still_ours(self, lease: Lease, process: Process) -> bool:
+        """Renew a lease.  While the database is away nobody else can take the job, so it goes on."""
+        progress = process.progress
+        lease = lease.at(progress.reached)
+        try:
+            return self._jobs.heartbeat(lease, int(100 * progress.fraction), progress.message)
+        except TROUBLE as error:
+            log.warning("job %s: goes on without the database (%s)", lease.job.id, reason(error))
+            return True
+
+    def _try_again_later(self, lease: Lease, stop: threading.Event, what: str) -> None:
+        """Give a job back whose attempt has ended without an answer, or give it up."""
+        lease = lease.crashed()
+        number = lease.job.attempts
+        if lease.crashes >= MAXIMUM_CRASHES:
+            self._log(lease).add(f"attempt {number} {what}; given up")
+            self._give_up(lease, stop)
+            return
+        seconds = growing_delay(lease.crashes, LONGEST_DELAY)
+        message = f"attempt {number} {what}; tried again after {seconds:.1f} s"
+        log.warning("job %s: %s", lease.job.id, message)
+        self._log(lease).add(message)
+        self._record(stop, self._jobs.give_back, lease, message, seconds)
+
+    def _give_up(self, lease: Lease, stop: threading.Event) -> None:
+        message = f"given up: {lease.crashes} attempts ended at the same point: {self._log(lease).end()}"
+        self._finish(lease, stop, JobResult(JobStatus.FAILED, message))
 
     def _arguments(self, lease: Lease) -> list[str]:
         file = self._jobs.log_path(lease.job).with_suffix(".toml")
@@ -116,16 +178,38 @@ class Worker:
         file.write_bytes(tomli_w.dumps(lease.document).encode())
         return [
             *(kind_named(lease.job.kind).command, str(file)),
-            *("--store", str(self._store)),
+            *("--store", str(self._store.path)),
             *("--progress", "json", "--json"),
         ]
 
-    def _finish(self, lease: Lease, result: JobResult) -> None:
-        if self._jobs.finish(lease, result.status, result.message):
+    def _log(self, lease: Lease) -> JobLog:
+        return JobLog(self._jobs.log_path(lease.job))
+
+    def _finish(self, lease: Lease, stop: threading.Event, result: JobResult) -> None:
+        if self._record(stop, self._jobs.finish, lease, result.status, result.message):
             log.info("job %s: %s, %s", lease.job.id, result.status, result.message)
 
+    def _record(
+        self,
+        stop: threading.Event,
+        change: Callable[Concatenate[Lease, Arguments], bool],
+        lease: Lease,
+        *arguments: Arguments.args,
+        **named: Arguments.kwargs,
+    ) -> bool:
+        """Change a job, again and again while the database is away; if the worker stops, the lease ends."""
+        tries = 0
+        while True:
+            try:
+                return change(lease, *arguments, **named)
+            except TROUBLE as error:
+                tries += 1
+                log.warning("job %s: the database cannot be used (%s)", lease.job.id, reason(error))
+            if stop.wait(growing_delay(tries, LONGEST_WAIT)):
+                return False
 
-def job_result(kind: str, status: int, output: str, last_message: str) -> JobResult:
+
+def job_result(kind: str, status: int, output: str) -> JobResult | None:
     """Return how a job has ended, from what its command has done.
 
     Parameters
@@ -135,17 +219,23 @@ def job_result(kind: str, status: int, output: str, last_message: str) -> JobRes
     status : int
         Exit status of the command.
     output : str
-        Standard output: one JSON document, unless the command ended with an error.
-    last_message : str
-        Last line of standard error.
+        Standard output: one JSON document if the command has answered.
 
     Returns
     -------
-    JobResult
+    JobResult or None
+        None if there is no answer.
     """
+    if status not in ANSWERS:
+        return None
     try:
-        document = json.loads(output)
-    except json.JSONDecodeError:
-        return JobResult(JobStatus.FAILED, last_message or f"ended with status {status}")
-    succeeded = JobStatus.SUCCEEDED if status == 0 else JobStatus.FAILED
-    return JobResult(succeeded, kind_named(kind).summary(document))
+        return JobResult(ANSWERS[status], kind_named(kind).summary(json.loads(output)))
+    except (ValueError, LookupError, TypeError):  # cut short, or not the document of such an answer
+        return None
+
+
+def _in_words(status: int) -> str:
+    try:
+        return f"by {signal.Signals(status - 128).name}"
+    except ValueError:
+        return f"with status {status}"

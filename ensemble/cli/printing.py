@@ -48,7 +48,7 @@ def print_table(table: Table) -> None:
 
 
 def print_answer(answer: Answer, as_json: bool) -> NoReturn:
-    """Print an answer and exit, with status 1 if it is not complete.
+    """Print an answer and exit with its status.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def print_answer(answer: Answer, as_json: bool) -> NoReturn:
         print_table(answer.table())
         if answer.footer is not None:
             print(answer.footer)
-    raise typer.Exit(0 if answer.complete else 1)
+    raise typer.Exit(answer.status)
 
 
 def _text(cell: RenderableType) -> str:

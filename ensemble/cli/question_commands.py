@@ -41,8 +41,8 @@ def bisect(  # numpydoc ignore=PR01
 ) -> None:
     """Trace a boundary, on all ranks, running only what the store does not have.
 
-    Each rank makes runs of its own unless ranks are asked to share them.  The exit status is 0 only if every
-    search converged and every bracket that was to be certified is.
+    Each rank makes runs of its own unless ranks are asked to share them.  The exit status is 0 if every
+    search converged and every bracket that was to be certified is, else 4.
     """
     if tolerance is not None:
         changes = [*changes, f"search.tolerance={tolerance!r}"]
@@ -65,7 +65,7 @@ def run(  # numpydoc ignore=PR01
 ) -> None:
     """Simulate one scene on all ranks together, unless the store has the run.
 
-    The exit status is 1 if it failed numerically.
+    The exit status is 4 if it failed numerically.
     """
     if again and not no_store:
         _set_aside(scene, changes, store)
@@ -105,7 +105,7 @@ def answer_and_print(
     progress: ProgressFormat,
     as_json: bool,
 ) -> NoReturn:
-    """Answer a question on all ranks, print the answer and exit; with status 1 if it is not complete.
+    """Answer a question on all ranks, print the answer and exit; with status 4 if it is not complete.
 
     Collective.
 

@@ -27,7 +27,7 @@ def steady(  # numpydoc ignore=PR01
     """Compute the steady state to which a scene comes, and whether it is stable.
 
     It starts from the end of the scene's run.  Of a pair that revolves it tells whether the motion to which
-    it has settled is stable against what breaks its symmetry.  The exit status is 1 if there is no steady
+    it has settled is stable against what breaks its symmetry.  The exit status is 4 if there is no steady
     state or the motion has not settled.
     """
     from ensemble.config.documents import load_scene
@@ -63,7 +63,7 @@ def follow(  # numpydoc ignore=PR01
     """Follow a steady state as a parameter changes, through folds, and find where it becomes unstable.
 
     It starts from the end of the scene's run.  The branch ends at the given value, where it comes back to its
-    first one, or where the scene allows no more.  The exit status is 1 if there is no steady state.
+    first one, or where the scene allows no more.  The exit status is 4 if there is no steady state.
     """
     from ensemble.config.documents import load_scene
     from ensemble.questions.branches import BranchQuestion

@@ -47,7 +47,7 @@ def job_lines(console: Console) -> Iterator[Callable[[JobProgress[Any]], None]]:
     def show(progress: JobProgress[Any]) -> None:
         elapsed, left = progress.elapsed, progress.seconds_left
         fraction = 0.0 if left is None else elapsed / (elapsed + left)
-        _print_line(console, fraction, progress_text(progress))
+        _print_line(console, fraction, progress_text(progress), progress.runs + progress.known)
 
     yield show
 
@@ -135,7 +135,7 @@ def run_lines(console: Console) -> Iterator[Callable[[float, float], None]]:
         percent = int(100 * time / end)
         if percent != shown:
             shown = percent
-            _print_line(console, min(time / end, 1.0), f"time {time:g} of {end:g}")
+            _print_line(console, min(time / end, 1.0), f"time {time:g} of {end:g}", percent)
 
     yield show
 
@@ -178,8 +178,8 @@ def progress_text(progress: JobProgress[Any]) -> str:
     )
 
 
-def _print_line(console: Console, fraction: float, message: str) -> None:
-    line = ProgressLine(fraction=fraction, message=message)
+def _print_line(console: Console, fraction: float, message: str, reached: float) -> None:
+    line = ProgressLine(fraction=fraction, message=message, reached=reached)
     console.print(line.model_dump_json(), soft_wrap=True, highlight=False, markup=False)
 
 

@@ -14,9 +14,13 @@ class ProgressLine(BaseModel):
         From 0 to 1.
     message : str
         The same for people.
+    reached : float
+        The work behind it, to compare attempts with each other: the number of runs that are kept, or the
+        percentage of the only run.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     fraction: float = Field(ge=0, le=1)
     message: str
+    reached: float = Field(ge=0)

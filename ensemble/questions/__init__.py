@@ -25,10 +25,11 @@ from typing import Any, Final
 
 from ensemble.config.documents import preset_document
 from ensemble.config.overrides import override
-from ensemble.questions.question import Answer, Question, StoredAnswer, StoredAnswers
+from ensemble.questions.question import INCOMPLETE_STATUS, Answer, Question, StoredAnswer, StoredAnswers
 from solver.scene import Model
 
 __all__ = [
+    "INCOMPLETE_STATUS",
     "Answer",
     "Question",
     "StoredAnswer",

@@ -1,4 +1,4 @@
-"""What an answer may cost: points × vesicles × time to simulate, over all runs."""
+"""What an answer may cost: points × vesicles × time to simulate, over all runs, and memory."""
 
 from __future__ import annotations
 
@@ -18,6 +18,12 @@ _VESICLE_SERIES = 8  # numbers of diagnostics of each vesicle, more than there a
 _AUTOMATIC_POINTS = 128  # what "auto" is counted as: most scenes end with fewer
 _CONTRAST = 8.0  # how much longer a step takes with a viscosity contrast: at 64 points 5 to 9 times, measured
 
+# Memory: with 1024 and 2048 points in all and a contrast a process used 670 and 1530 MB (`tests/README.md`).
+_BASE_BYTES = 4e8
+_POINT_BYTES = 8e3
+_PAIR_BYTES = 300.0
+_NUMBER_BYTES = 16.0  # recorded numbers are copied once when they are written
+
 
 @dataclass(frozen=True)
 class Cost:
@@ -31,11 +37,14 @@ class Cost:
         Points × vesicles × time to simulate, over all runs.
     recorded : float
         Numbers that are recorded, over all runs.
+    memory : float
+        Bytes that a process needs for the largest run.
     """
 
     runs: int
     work: float
     recorded: float
+    memory: float
 
 
 def total_cost(planned_runs: Iterable[tuple[Scene, int]]) -> Cost:
@@ -55,13 +64,14 @@ def total_cost(planned_runs: Iterable[tuple[Scene, int]]) -> Cost:
     ValueError
         If a run would record more than it may; names the interval and its least value.
     """
-    runs, work, recorded = 0, 0.0, 0.0
+    runs, work, recorded, memory = 0, 0.0, 0.0, 0.0
     for scene, count in planned_runs:
         _limit_output(scene)
         runs += count
         work += count * run_work(scene)
         recorded += count * recorded_numbers(scene)
-    return Cost(runs, work, recorded)
+        memory = max(memory, run_memory(scene))
+    return Cost(runs, work, recorded, memory)
 
 
 def run_work(scene: Scene) -> float:
@@ -80,7 +90,7 @@ def run_work(scene: Scene) -> float:
     time = scene.horizon * scene.criteria.extensions
     if scene.start.relaxed:
         time += scene.start.horizon
-    if any(vesicle.viscosity_contrast != 1 for vesicle in scene.vesicles):
+    if _has_contrast(scene):
         time *= _CONTRAST
     return float(_points(scene) * time)
 
@@ -102,6 +112,30 @@ def recorded_numbers(scene: Scene) -> float:
     records = time / output.interval + _ENDS
     frames = min(time / output.frame_interval + _ENDS, records)
     return records * (_SERIES + _VESICLE_SERIES * vesicles) + frames * (1 + 2 * (_points(scene) + vesicles))
+
+
+def run_memory(scene: Scene) -> float:
+    """Return the memory that a run needs at most.
+
+    Parameters
+    ----------
+    scene : Scene
+        That is run.
+
+    Returns
+    -------
+    float
+        Bytes of private data of a process: the interpreter with compiled kernels, dense matrices of all
+        points with each other if a viscosity contrast is solved for, and what is recorded.
+    """
+    points = _points(scene)
+    pairs = points**2 if _has_contrast(scene) else 0
+    numbers = _NUMBER_BYTES * recorded_numbers(scene)
+    return _BASE_BYTES + _POINT_BYTES * points + _PAIR_BYTES * pairs + numbers
+
+
+def _has_contrast(scene: Scene) -> bool:
+    return any(vesicle.viscosity_contrast != 1 for vesicle in scene.vesicles)
 
 
 def _points(scene: Scene) -> int:

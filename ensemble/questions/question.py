@@ -32,6 +32,9 @@ SomeDocument = TypeVar("SomeDocument", bound=Model)
 
 KEY_DIGITS = 32  # hexadecimal
 
+# Exit status of a command that gave an answer which is not complete.  It is no status of a failure (1, 2, or
+# 128 and a signal), nor made of those of several ranks, which launchers combine bit by bit.
+INCOMPLETE_STATUS = 4
 
 SHORT_KEY = 8  # characters that tell the keys of a store apart, almost always
 
@@ -62,7 +65,12 @@ class Answer(ABC):
     @property
     @abstractmethod
     def complete(self) -> bool:
-        """Whether everything that was asked is answered; else the exit status is 1."""
+        """Whether everything that was asked is answered; else the exit status is `INCOMPLETE_STATUS`."""
+
+    @property
+    def status(self) -> int:
+        """Exit status of the command that gives it."""
+        return 0 if self.complete else INCOMPLETE_STATUS
 
     @abstractmethod
     def json_document(self) -> dict[str, Any]:

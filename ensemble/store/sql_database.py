@@ -24,6 +24,7 @@ from pydantic_settings import BaseSettings, SettingsConfigDict
 from sqlalchemy import URL, Engine, create_engine, event, make_url
 from sqlalchemy.engine.interfaces import DBAPIConnection
 from sqlalchemy.exc import ArgumentError, DBAPIError, NoSuchModuleError
+from sqlalchemy.exc import TimeoutError as NoConnectionLeft
 from sqlalchemy.pool import ConnectionPoolEntry, QueuePool
 
 from ensemble.disk import flush, replacing
@@ -35,7 +36,7 @@ BUSY_SECONDS = 60
 Journal = Literal["wal", "delete"]
 
 # What is raised where a URL is invalid, its driver is missing, or the database does not answer.
-UNUSABLE = (ArgumentError, NoSuchModuleError, ModuleNotFoundError, DBAPIError)
+UNUSABLE = (ArgumentError, NoSuchModuleError, ModuleNotFoundError, DBAPIError, NoConnectionLeft)
 
 
 class DatabaseSettings(BaseSettings):

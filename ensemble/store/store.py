@@ -123,6 +123,20 @@ class Store(AbstractContextManager["Store"]):
             store._catalog.keys()
         return store
 
+    def require_usable(self) -> None:
+        """Raise an error unless runs could be written and the catalog be read now.
+
+        Raises
+        ------
+        OSError
+            If the directory is gone, full, or not to be written to.
+        sqlalchemy.exc.SQLAlchemyError
+            If the catalog does not answer.
+        """
+        _require_writable(self.path)
+        _require_catalog(self.path)
+        self._catalog.boundaries_page((), None, 1)
+
     def close(self) -> None:
         """Close the catalog.  Whole runs that this process staged stay for the next one to adopt."""
         self._staging.close()

@@ -151,13 +151,16 @@ def test_a_route_is_added_as_described(filled_store: Path) -> None:
         assert "outcome" in refused.json()["detail"]
 
 
+OF_THE_MACHINE = {"maximum_ranks": "number of processors", "maximum_memory": "that of the machine"}
+
+
 def settings_table() -> list[str]:
     """Return the rows of the table of settings."""
     rows = []
     for name, field in Settings.model_fields.items():
         if name == "store":  # an option of the commands
             continue
-        default = "number of processors" if field.default_factory else _written(field.default)
+        default = OF_THE_MACHINE[name] if field.default_factory else _written(field.default)
         rows.append(f"| `ENSEMBLE_{name.upper()}` | {default} | {field.description} |")
     return rows
 

@@ -200,14 +200,19 @@ class SubmissionForm {
 
   /**
    * @param {{runs: number, cost: number, maximum: number, recorded: number, most_recorded: number,
-   *   accepted: boolean}} estimate
+   *   memory: number, most_memory: number, accepted: boolean}} estimate
    */
-  #showCost({ runs, cost, maximum, recorded, most_recorded, accepted }) {
+  #showCost({ runs, cost, maximum, recorded, most_recorded, memory, most_memory, accepted }) {
     const count = runs === 1 ? "One run" : `At most ${runs} runs`;
     const share = `cost ${number(cost, 2)} of ${number(maximum, 2)} allowed (points × vesicles × time)`;
     if (recorded > most_recorded) {
       const records = `records ${number(recorded, 2)} numbers of ${number(most_recorded, 2)} allowed`;
       this.cost.textContent = `Too large: ${records}. Raise the intervals of the output.`;
+      return;
+    }
+    if (memory > most_memory) {
+      const bytes = `needs ${number(memory / 1e9, 2)} GB of ${number(most_memory / 1e9, 2)} GB allowed`;
+      this.cost.textContent = `Too large: ${bytes}. Choose fewer points or vesicles.`;
       return;
     }
     this.cost.textContent = accepted ? `${count}, ${share}.` : `Too large: ${share}.`;

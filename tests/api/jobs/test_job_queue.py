@@ -330,6 +330,35 @@ def test_what_is_given_back_is_leased_again(jobs):
     assert leased(jobs).job.attempts == 2
 
 
+def test_a_job_that_waits_after_a_crash_lets_the_next_one_of_its_owner_begin(jobs, clock):
+    first, second = submit(jobs), submit(jobs)
+    lease = leased(jobs)
+    assert jobs.give_back(lease.crashed(), "crashed", 10.0)
+    assert leased(jobs).job.id == second.id
+    assert jobs.lease("worker") is None
+    clock.pass_by(10.0)
+    again = leased(jobs)
+    assert (again.job.id, again.crashes) == (first.id, 1)
+
+
+def test_crashes_are_counted_until_a_job_comes_further(jobs, clock):
+    submit(jobs)
+    for crashes, reached in enumerate([5.0, 5.0, 3.0]):
+        lease = leased(jobs)
+        assert lease.crashes == crashes
+        assert jobs.heartbeat(lease.at(reached), 5, "")
+        assert jobs.give_back(lease.at(reached).crashed(), "crashed")
+    clock.pass_by(1.0)
+    lease = leased(jobs)
+    assert (lease.crashes, lease.reached) == (3, 5.0)
+    assert jobs.heartbeat(lease.at(6.0), 6, "")
+    clock.pass_by(1.1 * LEASE_SECONDS)
+    lost = leased(jobs, "another")
+    assert (lost.crashes, lost.reached) == (1, 6.0)
+    assert jobs.give_back(lost, "stopped")
+    assert leased(jobs).crashes == 1, "a stop is no crash"
+
+
 def test_a_dismissed_job_is_taken_from_its_worker(jobs):
     job = submit(jobs)
     lease = leased(jobs)

@@ -239,6 +239,36 @@ def test_presets_are_given_in_full_and_with_their_cost(submitting):
         assert preset["estimate"]["accepted"]
 
 
+def test_memory_grows_with_the_square_of_all_points_if_there_is_a_contrast(submitting):
+    def memory(points: int, contrast: float) -> float:
+        changes = {"numerics.points": points, "vesicles.viscosity_contrast": contrast}
+        submission = {"preset": "suspension-shear", "set": changes}
+        return submitting.post("/estimate", json=submission).json()["memory"]
+
+    assert memory(512, 4.0) - memory(256, 4.0) == pytest.approx(
+        4 * (memory(256, 4.0) - memory(128, 4.0)), 0.01
+    )
+    assert memory(512, 1.0) < 1.3 * memory(128, 1.0)
+
+
+def test_a_job_that_needs_too_much_memory_is_refused(store):
+    fine = {"numerics.points": 128, "vesicles.viscosity_contrast": 4.0}
+    large = {"preset": "suspension-shear", "set": fine}
+    with client_of(store, maximum_memory=2_000_000_000) as client:
+        assert not client.post("/estimate", json=large).json()["accepted"]
+        refused = client.post("/jobs", json=large)
+        assert refused.status_code == 422
+        assert "memory: 3.26e+09" in refused.json()["detail"]
+        assert refused.json()["memory"] > refused.json()["most_memory"] == 2e9
+        small = {"preset": "critical-hamaker"}
+        assert client.post("/jobs", json={**small, "ranks": 2}).status_code == 202
+    with client_of(store, maximum_memory=800_000_000, maximum_ranks=2) as client:
+        refused = client.post("/jobs", json={**small, "ranks": 2})
+        assert refused.status_code == 422
+        assert "ranks: 2 — must be at most 1" in refused.json()["detail"]
+        assert client.post("/jobs", json=small).json()["ranks"] == 1
+
+
 def test_the_estimate_is_points_times_vesicles_times_time(submitting):
     scene = load_scene("doublet-shear").model_dump(mode="json")
     estimate = submitting.post("/estimate", json={"scene": scene}).json()

@@ -5,25 +5,33 @@ from __future__ import annotations
 import json
 import random
 import signal
+import sqlite3
+import subprocess
+import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 import psutil
 import pytest
 
 from api.database.service_database import Database
-from api.jobs.job import Job, JobStatus
+from api.jobs.job import UNFINISHED, Job, JobStatus, Lease
 from api.jobs.job_queue import Jobs
 from api.settings import Settings
 from api.worker.background import NICENESS
-from api.worker.worker import MAXIMUM_ATTEMPTS, JobResult, job_result
-from ensemble.questions import Question, preset_question
+from api.worker.delays import growing_delay
+from api.worker.mpirun import mpirun_command
+from api.worker.worker import ANSWERS, MAXIMUM_CRASHES, JobResult, Worker, job_result
+from ensemble.questions import INCOMPLETE_STATUS, Question, preset_question
 from ensemble.store import Store
 from tests.api.accepting import accepted
 from tests.api.processes import Family, alive, wait_until, working
 
 SECONDS = 3600.0
+SEPARATED = json.dumps({"outcome": "separated", "failure": None})
+ANSWER = json.dumps({"outcome": "failed", "failure": "underflow"})
 # Far less on a machine that has nothing else to do.
 SECONDS_TO_DISMISS = 60
 SECONDS_TO_DIE = 20
@@ -210,45 +218,146 @@ def test_a_kill_leaves_no_process_loses_no_job_and_repeats_no_run(jobs, store, v
         assert opened.check() == []
 
 
-def test_a_job_that_is_always_cut_short_is_given_up(jobs, store):
+def leased(jobs: Jobs, name: str = "unlucky") -> Lease:
+    lease = jobs.lease(name)
+    assert lease is not None
+    return lease
+
+
+def test_a_job_that_has_taken_its_workers_along_is_given_up(jobs, store):
     job = submit(jobs, QUICK_SCENE)
-    for _ in range(MAXIMUM_ATTEMPTS):
-        lease = jobs.lease("unlucky")
-        assert lease is not None
-        jobs.give_back(lease, "cut short")
+    for _ in range(MAXIMUM_CRASHES):
+        jobs.give_back(leased(jobs).crashed(), "cut short")
     with working(store):
         wait_until(finished(jobs, job))
     assert jobs.get(job.id).status is JobStatus.FAILED
-    assert str(MAXIMUM_ATTEMPTS) in jobs.get(job.id).message
-    assert not jobs.log_path(job).exists()
+    assert f"{MAXIMUM_CRASHES} attempts ended at the same point" in jobs.get(job.id).message
+
+
+@contextmanager
+def locked_catalog(store: Path) -> Iterator[None]:
+    """Keep everybody else from reading the catalog."""
+    with closing(sqlite3.connect(store / "catalog.sqlite", isolation_level=None)) as connection:
+        connection.execute("BEGIN EXCLUSIVE")
+        yield
+
+
+@pytest.fixture
+def worker(jobs: Jobs, store: Path) -> Iterator[tuple[Worker, threading.Event]]:
+    """A worker in this process, and what stops it."""
+    with Store.open(store) as opened:
+        yield Worker(jobs, opened, 1 << 32), threading.Event()
+
+
+@pytest.fixture
+def command(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
+    """Let jobs be carried out by a piece of shell script."""
+
+    def use(script: str) -> None:
+        monkeypatch.setattr("api.worker.worker.mpirun_command", lambda *_: ["/bin/sh", "-c", script])
+
+    return use
+
+
+CRASHES = {
+    "an error that is told": ("echo 'ensemble: the database cannot be used' >&2; exit 1", "with status 1"),
+    "what was accepted and is refused": (
+        "echo 'ensemble: store: cannot be opened' >&2; exit 2",
+        "with status 2",
+    ),
+    "an error of MPI": ("echo 'Abort(1) on node 0' >&2; exit 1", "with status 1"),
+    "a killed rank": ("kill -9 $$", "by SIGKILL"),
+    "a crash in compiled code": ("kill -11 $$", "by SIGSEGV"),
+    "success without an answer": ("exit 0", "with status 0"),
+    "an answer that is cut short": ('echo \'{"outcome": "bou\'; exit 0', "with status 0"),
+    "another document": ("echo '[1]'; exit 0", "with status 0"),
+    "an answer and then a failure": (f"echo '{ANSWER}'; exit 1", "with status 1"),
+}
+
+
+@pytest.mark.parametrize("crash", CRASHES)
+def test_what_is_no_answer_is_tried_again(jobs, worker, command, monkeypatch, crash):
+    script, words = CRASHES[crash]
+    works, stop = worker
+    waited: list[float] = []
+
+    def delay(tries: int, longest: float) -> float:
+        waited.append(growing_delay(tries, longest))
+        return 1e-3
+
+    monkeypatch.setattr("api.worker.worker.growing_delay", delay)
+    job = submit(jobs, QUICK_SCENE)
+    command(script)
+    thread = threading.Thread(target=works.run, args=(stop,))
+    thread.start()
+    try:
+        wait_until(lambda: jobs.get(job.id).attempts > 2)
+        assert jobs.get(job.id).status in UNFINISHED
+        command(f"echo '{ANSWER}'; exit {INCOMPLETE_STATUS}")
+        wait_until(finished(jobs, job))
+    finally:
+        stop.set()
+        thread.join()
+    done = jobs.get(job.id)
+    assert (done.status, done.message) == (JobStatus.FAILED, "underflow")
+    assert f"attempt 1 ended {words}; tried again" in jobs.log_path(job).read_text()
+    assert all(2.0**number / 2 <= seconds <= 2.0**number for number, seconds in enumerate(waited))
+
+
+def test_a_job_that_always_crashes_fails_with_the_end_of_its_log(jobs, worker, command, monkeypatch):
+    works, stop = worker
+    monkeypatch.setattr("api.worker.worker.growing_delay", lambda *_: 1e-3)
+    job = submit(jobs, QUICK_SCENE)
+    command("echo 'terminate called after throwing an instance' >&2; kill -6 $$")
+    thread = threading.Thread(target=works.run, args=(stop,))
+    thread.start()
+    try:
+        wait_until(finished(jobs, job))
+    finally:
+        stop.set()
+        thread.join()
+    done = jobs.get(job.id)
+    assert done.status is JobStatus.FAILED
+    assert done.attempts == MAXIMUM_CRASHES
+    assert "terminate called" in done.message
+    assert "by SIGABRT" in done.message
+
+
+def test_a_job_that_needs_more_memory_than_it_may_have_says_so(launcher):
+    large = ("--set=numerics.points=1024", "--set=vesicles.viscosity_contrast=4.0")
+    command = mpirun_command(1, 300_000_000, ["run", "doublet-shear", *large, "--no-store", "--json"])
+    ended = subprocess.run(command, env=launcher.environment, capture_output=True, text=True, check=False)
+    assert ended.returncode not in ANSWERS
+    assert "ensemble: there is not enough memory" in ended.stderr
+
+
+@pytest.mark.long
+def test_a_locked_catalog_costs_no_job(jobs, store):
+    job = submit(jobs, QUICK_SCENE)
+    with working(store) as family:
+        wait_until(simulating(family, 1))
+        with locked_catalog(store):
+            wait_until(lambda: not family.descendants(), SECONDS_TO_DISMISS * 3)
+        wait_until(finished(jobs, job))
+    assert jobs.get(job.id).status is JobStatus.SUCCEEDED
+    with Store.existing(store) as opened:
+        assert opened.check() == []
 
 
 @pytest.mark.parametrize(
-    ("kind", "status", "output", "last_message", "expected"),
+    ("status", "output", "expected"),
     [
+        (INCOMPLETE_STATUS, ANSWER, JobResult(JobStatus.FAILED, "underflow")),
         (
-            "scene",
-            2,
-            "",
-            "ensemble: flow.rate: no",
-            JobResult(JobStatus.FAILED, "ensemble: flow.rate: no"),
-        ),
-        ("scene", 1, "", "", JobResult(JobStatus.FAILED, "ended with status 1")),
-        (
-            "scene",
-            1,
-            json.dumps({"outcome": "failed", "failure": "underflow"}),
-            "warning",
-            JobResult(JobStatus.FAILED, "underflow"),
-        ),
-        (
-            "scene",
             0,
             json.dumps({"outcome": "separated", "failure": None}),
-            "",
             JobResult(JobStatus.SUCCEEDED, "separated"),
         ),
+        (1, ANSWER, None),
+        (2, "", None),
+        (INCOMPLETE_STATUS, "", None),
+        (INCOMPLETE_STATUS | 1, ANSWER, None),
     ],
 )
-def test_how_a_job_has_ended(kind, status, output, last_message, expected):
-    assert job_result(kind, status, output, last_message) == expected
+def test_how_a_job_has_ended(status, output, expected):
+    assert job_result("scene", status, output) == expected

@@ -16,6 +16,7 @@ import pytest
 
 from ensemble.config.documents import load_scene, load_study, preset_names
 from ensemble.config.run_key import run_key
+from ensemble.questions import INCOMPLETE_STATUS
 
 QUICK_SCENE = ("doublet-shear", "--set=numerics.points=32", "--set=numerics.tolerance=1e-3")
 # Standard output of one JSON document, null where the scene has no such quantity.
@@ -279,7 +280,7 @@ def test_the_exit_status_tells_that_a_search_did_not_converge(ensemble, tmp_path
         f"--store={tmp_path / 'store'}",
         "--json",
     )
-    assert result.returncode == 1, result.stderr
+    assert result.returncode == INCOMPLETE_STATUS, result.stderr
     (point,) = json.loads(result.stdout)["boundary"]
     assert point["status"] == "unbracketed"
     assert point["bracket"][0] is None
@@ -289,7 +290,7 @@ def test_the_exit_status_tells_that_a_search_did_not_converge(ensemble, tmp_path
 def test_a_run_that_fails_at_its_start_is_an_outcome(ensemble, tmp_path):
     slender = ["--set=vesicles.reduced_area=0.03", f"--store={tmp_path / 'store'}"]
     result = ensemble("run", "vesicle-shear", *slender, "--json")
-    assert result.returncode == 1, result.stderr
+    assert result.returncode == INCOMPLETE_STATUS, result.stderr
     document = json.loads(result.stdout, parse_constant=pytest.fail)
     assert set(document) == RUN_FIELDS
     assert document["outcome"] == "failed"

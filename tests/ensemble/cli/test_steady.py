@@ -10,6 +10,7 @@ import pytest
 import xarray
 
 from ensemble.figures.bifurcation import bifurcation_diagram
+from ensemble.questions import INCOMPLETE_STATUS
 from ensemble.store import Store, StoreError
 
 TREADING = (
@@ -145,7 +146,7 @@ def test_bad_input_is_refused_before_any_work(ensemble, tmp_path, case):
 
 def test_a_run_that_does_not_rest_has_no_steady_state(ensemble):
     result = ensemble("steady", *TREADING, "--set=vesicles.viscosity_contrast=6", "--no-store", "--json")
-    assert result.returncode == 1
+    assert result.returncode == INCOMPLETE_STATUS
     assert "tumbling" in json.loads(result.stdout)["failure"]
 
 
@@ -164,5 +165,5 @@ def test_of_a_pair_that_revolves_the_stability_of_its_motion_is_told(ensemble, t
 
 def test_a_motion_that_has_not_settled_has_no_stability(ensemble):
     result = ensemble("steady", "doublet-shear", "--set=adhesion.hamaker=0.1", "--no-store", "--json")
-    assert result.returncode == 1
+    assert result.returncode == INCOMPLETE_STATUS
     assert "separated" in json.loads(result.stdout)["failure"]
