@@ -20,6 +20,7 @@ DEPLOY = ROOT / "deploy"
 UNITS = sorted(DEPLOY.glob("*.service"))
 ENSEMBLE = (sys.executable, "-m", "ensemble")
 SECONDS = 240
+MOST_EXPOSED = 30  # tenths, of the ten that `systemd-analyze security` counts to
 
 # Starts two ranks, as Slurm's own would start as many as the job has.
 SRUN = '#!/usr/bin/env bash\nexec mpirun -n 2 "$@"\n'
@@ -84,6 +85,22 @@ def test_units_are_valid(unit: Path, tmp_path: Path) -> None:
     command = ["systemd-analyze", "verify", "--man=no", str(tmp_path / unit.name)]
     verified = subprocess.run(command, capture_output=True, text=True, timeout=SECONDS, check=False)
     assert (verified.returncode, verified.stderr) == (0, "")
+
+
+@pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="no systemd")
+@pytest.mark.parametrize("unit", UNITS, ids=lambda unit: unit.name)
+def test_units_may_do_little(unit: Path) -> None:
+    command = ["systemd-analyze", "security", "--offline=yes", f"--threshold={MOST_EXPOSED}", str(unit)]
+    judged = subprocess.run(command, capture_output=True, text=True, timeout=SECONDS, check=False)
+    assert judged.returncode == 0, judged.stdout
+
+
+@pytest.mark.parametrize("unit", UNITS, ids=lambda unit: unit.name)
+def test_units_are_bounded_and_always_started_again(unit: Path) -> None:
+    lines = unit.read_text(encoding="utf-8").splitlines()
+    assert "StartLimitIntervalSec=0" in lines
+    for limit in ("MemoryMax=", "TasksMax="):
+        assert any(line.startswith(limit) for line in lines)
 
 
 def test_the_batch_script_continues_a_study(finished_study, bisect_command, launcher, tmp_path: Path) -> None:
