@@ -87,7 +87,7 @@ def symmetry_breaking(run: Run) -> SymmetryBreaking:
     frames = run.frames
     scene = with_points(run.scene, frames.tangent_angle.shape[-1])
     rate = symmetry_growth(scene, Shapes(frames.tangent_angle[-1], frames.center[-1]), run.period)
-    return SymmetryBreaking(rate, run.period)
+    return SymmetryBreaking(rate, float(run.period))
 
 
 def symmetry_growth(scene: Scene, shapes: Shapes, period: float) -> float:
@@ -125,7 +125,7 @@ def symmetry_growth(scene: Scene, shapes: Shapes, period: float) -> float:
         perturbed = difference.with_shape(state, _turn_and_waves(membranes.points))
         later, _ = difference.follow(perturbed, period)
         _, growth = difference.follow(later, period)
-    return growth / period
+    return float(growth / period)
 
 
 def require_image(scene: Scene) -> None:
