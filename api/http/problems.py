@@ -12,7 +12,8 @@ from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from pydantic import BaseModel, ConfigDict
 from pydantic_core import ErrorDetails
-from sqlalchemy.exc import OperationalError
+from sqlalchemy.exc import InterfaceError, OperationalError
+from sqlalchemy.exc import TimeoutError as NoConnectionLeft
 from starlette.exceptions import HTTPException
 
 from ensemble.config.validation import describe
@@ -99,7 +100,8 @@ def install_handlers(app: FastAPI, missing: Iterable[type[Exception]]) -> None:
     app.add_exception_handler(RequestValidationError, _validation_error)
     app.add_exception_handler(BadInput, _bad_input)
     app.add_exception_handler(StoreError, _damage)
-    app.add_exception_handler(OperationalError, _no_database)
+    for trouble in (OperationalError, InterfaceError, NoConnectionLeft):
+        app.add_exception_handler(trouble, _no_database)
     for error in missing:
         app.add_exception_handler(error, _missing_resource)
     app.add_exception_handler(Exception, _server_error)
@@ -159,7 +161,6 @@ def _damage(request: Request, error: Exception) -> Response:
 
 
 def _no_database(request: Request, error: Exception) -> Response:
-    assert isinstance(error, OperationalError)
     _log.error("%s: %s", request.url.path, reason(error))
     cause = "its disk is full" if "full" in reason(error) else "it does not answer or cannot be written to"
     detail = f"the database cannot be used at the moment: {cause}"

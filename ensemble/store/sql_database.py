@@ -23,7 +23,13 @@ from pydantic import BaseModel, ConfigDict
 from pydantic_settings import BaseSettings, SettingsConfigDict
 from sqlalchemy import URL, Engine, create_engine, event, make_url
 from sqlalchemy.engine.interfaces import DBAPIConnection
-from sqlalchemy.exc import ArgumentError, DBAPIError, NoSuchModuleError
+from sqlalchemy.exc import (
+    ArgumentError,
+    DBAPIError,
+    DisconnectionError,
+    NoSuchModuleError,
+    OperationalError,
+)
 from sqlalchemy.exc import TimeoutError as NoConnectionLeft
 from sqlalchemy.pool import ConnectionPoolEntry, QueuePool
 
@@ -167,7 +173,31 @@ def engine(url: str, journal: Journal = "wal") -> Engine:
         return create_engine(url, pool_pre_ping=True)
     made = create_engine(url, connect_args={"timeout": BUSY_SECONDS})
     event.listen(made, "connect", partial(_durable, journal))
+    path = Path(make_url(url).database or "")
+    event.listen(made, "connect", partial(_note_file, path))
+    event.listen(made, "checkout", partial(_require_same_file, path))
     return made
+
+
+def _note_file(path: Path, _: DBAPIConnection, record: ConnectionPoolEntry) -> None:
+    record.info["file"] = _identity(path)
+
+
+def _require_same_file(path: Path, _: DBAPIConnection, record: ConnectionPoolEntry, __: object) -> None:
+    """Refuse a connection to a file that is no longer in its place: what it took would be lost with it."""
+    present = _identity(path)
+    if present is None:
+        raise OperationalError(None, None, FileNotFoundError(f"{path.name} has been moved or deleted"))
+    if present != record.info["file"]:
+        raise DisconnectionError  # the pool connects to the one that is there now
+
+
+def _identity(path: Path) -> tuple[int, int] | None:
+    try:
+        status = path.stat()
+    except OSError:
+        return None
+    return status.st_dev, status.st_ino
 
 
 def reading_engine(url: str) -> Engine:

@@ -60,3 +60,21 @@ def test_a_full_disk_refuses_jobs_for_as_long_as_it_is_full(tmp_path: Path) -> N
                 assert client.get("/jobs").json()["items"] == []
             assert client.get("/readyz").status_code == 200
             assert client.post("/jobs", json={"preset": "doublet-shear"}).status_code == 202
+
+
+def test_a_store_that_is_moved_while_it_is_served_takes_no_job(store: Path) -> None:
+    elsewhere = store.with_name("elsewhere")
+    with client_of(store) as client:
+        assert client.post("/jobs", json={"preset": "doublet-shear"}).status_code == 202
+        store.rename(elsewhere)
+        for _ in range(2):
+            response = client.post("/jobs", json={"preset": "doublet-shear"})
+            assert response.status_code == 503, response.text
+            assert response.headers["retry-after"]
+            assert client.get("/jobs").status_code == 503
+            assert client.get("/readyz").status_code == 503
+        assert not store.exists()
+        elsewhere.rename(store)
+        assert client.get("/readyz").status_code == 200
+        assert client.post("/jobs", json={"preset": "doublet-shear"}).status_code == 202
+        assert len(client.get("/jobs").json()["items"]) == 2
