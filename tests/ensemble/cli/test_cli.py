@@ -210,7 +210,7 @@ def test_a_program_reads_progress_in_lines_of_json(ensemble, bisect_command, tmp
     json.loads(result.stdout)
     lines = [json.loads(line) for line in result.stderr.splitlines()]
     assert len(lines) > 5
-    assert all(line.keys() == {"fraction", "message"} for line in lines)
+    assert all(line.keys() == {"fraction", "message", "reached"} for line in lines)
     assert all(0 <= line["fraction"] <= 1 for line in lines)
     assert any(0 < line["fraction"] < 1 for line in lines)
 

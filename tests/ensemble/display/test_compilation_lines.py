@@ -37,4 +37,8 @@ def test_compilation_is_said_once_and_then_now_and_again(monkeypatch: pytest.Mon
 
 def test_a_program_reads_of_compilation_in_json() -> None:
     (line,) = lines_about(1, for_program=True)
-    assert json.loads(line) == {"fraction": 0.0, "message": "compiling, once on this machine"}
+    assert json.loads(line) == {
+        "fraction": 0.0,
+        "message": "compiling, once on this machine",
+        "reached": 0.0,
+    }
