@@ -463,6 +463,7 @@ def test_the_page_runs_no_script_but_its_own(page: Page, url: str) -> None:
     assert page.evaluate("window.isOwned") is None
 
 
+@pytest.mark.long
 def test_a_job_is_followed_across_a_restart_of_the_service(page: Page, tmp_path: Path) -> None:
     store = tmp_path / "store"
     first = start_service(store, "--workers=0")

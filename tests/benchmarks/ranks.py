@@ -86,10 +86,10 @@ def evaluation_seconds(scene: Scene, parallel: Parallel, timed: TimedCommunicato
     equation.jacobian(state)
     best = best_processor = np.inf
     for _ in range(_EVALUATIONS):
-        moved = state + 1e-3 * random.standard_normal(state.size)
-        equation.rate(moved)
+        equation.rate(state + 1e-3 * random.standard_normal(state.size))
+        near = state + 1e-13 * random.standard_normal(state.size)  # the motion in the state itself is known
         began, processor, waited = time.perf_counter(), time.process_time(), timed.seconds
-        equation.rate(state)
+        equation.rate(near)
         best = min(best, time.perf_counter() - began)
         best_processor = min(best_processor, time.process_time() - processor - (timed.seconds - waited))
     return best, best_processor

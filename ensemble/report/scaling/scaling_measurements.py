@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
 
 _TIME_BETWEEN_STATES = 0.02  # during which the flow moves the centers
+_ACROSS = np.array([0.0, 1e-3])  # velocity
 _SIZES = tuple(8 * 8**power for power in range(7))  # bytes on each rank, 8 to 2 million
 _MANY = 200  # collectives of the smallest size in one measurement
 _MEBIBYTE = 1 << 20
@@ -99,7 +100,8 @@ def _measure_on_group(group: Intracomm, vesicles: int, repeats: int) -> Evaluati
     assert flow is not None
     centers = membranes.center(state)
     along_flow = flow.velocity(centers.T, centers.T).T
-    drift = membranes.pack(np.zeros_like(membranes.tangent_angle(state)), along_flow)
+    # And a little across it: no state may be the one before, whose motion is known.
+    drift = membranes.pack(np.zeros_like(membranes.tangent_angle(state)), along_flow + _ACROSS)
     states = (state + _TIME_BETWEEN_STATES * number * drift for number in range(1, repeats + 3))
     equation.rate(next(states))
     ranks.reset()

@@ -85,6 +85,7 @@ def simulating(family: Family, ranks: int) -> Callable[[], bool]:
     return all_there
 
 
+@pytest.mark.long
 def test_jobs_are_carried_out_one_after_the_other(jobs, store):
     scene, failing = submit(jobs, QUICK_SCENE), submit(jobs, FAILING_SCENE)
     study, unbracketed = submit(jobs, STUDY, ranks=2), submit(jobs, UNBRACKETED_STUDY)
