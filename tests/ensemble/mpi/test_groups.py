@@ -90,6 +90,7 @@ def brackets(stdout: str) -> list[tuple]:
     return [(point["bracket"], point["outcomes"]) for point in json.loads(stdout)["boundary"]]
 
 
+@pytest.mark.long
 def test_groups_find_the_brackets_of_single_ranks_to_the_last_bit(launcher, tmp_path):
     """Three ranks in groups of two: one group of two, and one of a single rank."""
     command = [*ENSEMBLE, "bisect", *STUDY, "--json"]
