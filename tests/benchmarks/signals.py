@@ -65,13 +65,13 @@ class Plan:
         return self.victim == "proxy" and self.signal != "SIGKILL"
 
     @classmethod
-    def draw(cls, chance: random.Random) -> Plan:
-        """Draw a plan."""
+    def draw(cls, chance: random.Random, earliest: float) -> Plan:
+        """Draw a plan, with a signal some seconds after the start at the earliest."""
         ranks = chance.randrange(5)
         name = chance.choice(list(SIGNALS))
         victims = VICTIMS if ranks != ALONE else ("launcher",)
         latest = START if chance.random() < 0.5 else LATEST
-        return cls(ranks, chance.choice(victims), name, chance.uniform(EARLIEST, latest))
+        return cls(ranks, chance.choice(victims), name, chance.uniform(earliest, latest))
 
 
 @dataclass
@@ -162,17 +162,13 @@ class Job:
         self.launcher.wait()
 
     @property
-    def has_answered(self) -> bool:
-        """Whether it has printed all it had to."""
+    def answer(self) -> dict[str, Any] | None:
+        """What it has printed, once that is whole.  A launcher may print of a signal after it."""
         try:
-            return bool(json.loads(self.printed))
+            answer, _ = json.JSONDecoder().raw_decode(self._printed.read_text())
         except json.JSONDecodeError:
-            return False
-
-    @property
-    def printed(self) -> str:
-        """Standard output so far."""
-        return self._printed.read_text()
+            return None
+        return dict(answer)
 
     @property
     def said(self) -> str:
@@ -200,11 +196,14 @@ class Series:
         New, for the stores and what the jobs print.
     seed : int
         Of all that is drawn.
+    earliest : float
+        Seconds after the start at which signals begin.
     """
 
-    def __init__(self, directory: Path, seed: int) -> None:
+    def __init__(self, directory: Path, seed: int, earliest: float = EARLIEST) -> None:
         self._directory = directory
         self._chance = random.Random(seed)
+        self._earliest = earliest
         self._stores = 0
         self._store = self._new_store()
         self.tries: list[Try] = []
@@ -220,7 +219,7 @@ class Series:
 
     def go_on(self) -> Try | None:
         """Make a try; None if the job came to its end, or could not be hit, before the signal."""
-        plan = Plan.draw(self._chance)
+        plan = Plan.draw(self._chance, self._earliest)
         job = Job(plan.ranks, self._store)
         try:
             time.sleep(plan.moment)
@@ -231,14 +230,14 @@ class Series:
         finally:
             job.end()
         status = job.launcher.returncode
-        had_ended = status == 0 or job.has_answered
+        had_ended = status == 0 or job.answer is not None
         late = had_ended and seconds is not None and seconds < RACE_SECONDS
         if not hit or late:
             if had_ended:
                 self._complete(job)
             return None
         made = Try(plan, HANG_SECONDS if seconds is None else seconds, status, job.said, left)
-        made.faults = [*_faults(made, job.has_answered), *_store_faults(self._store, known)]
+        made.faults = [*_faults(made, job.answer is not None), *_store_faults(self._store, known)]
         if plan.is_ignored and not made.faults:
             self.ignored += 1
         else:
@@ -253,7 +252,8 @@ class Series:
         return 0.0
 
     def _complete(self, job: Job) -> None:
-        self.brackets.add(json.dumps([point["bracket"] for point in json.loads(job.printed)["boundary"]]))
+        assert job.answer is not None
+        self.brackets.add(json.dumps([point["bracket"] for point in job.answer["boundary"]]))
         self.completed += 1
         self._store = self._new_store()
 
