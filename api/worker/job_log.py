@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from contextlib import suppress
 from pathlib import Path
 
+from ensemble.display.progress_line import ProgressLine
+
 TAIL_BYTES = 4096
 LAST_LINES = 5
+_PROGRESS = re.compile(r"[ \d]{2}\d%  ")  # what `JobLog.add_progress` begins a line with
 
 
 class JobLog:
@@ -31,6 +35,15 @@ class JobLog:
         with suppress(OSError), self._path.open("a", encoding="utf-8") as file:
             file.write(line if line.endswith("\n") else f"{line}\n")
 
+    def add_progress(self, progress: ProgressLine) -> None:
+        """Append a line about progress, which `end` leaves out.
+
+        Parameters
+        ----------
+        progress : ProgressLine
+        """
+        self.add(f"{progress.fraction:4.0%}  {progress.message}")
+
     def end(self) -> str:
         """Return the last lines that say something, without those about progress.
 
@@ -45,9 +58,5 @@ class JobLog:
                 lines = file.read().decode(errors="replace").splitlines()
         except OSError:
             return "there is no log"
-        said = [line.strip() for line in lines if line.strip() and not _is_progress(line)]
+        said = [line.strip() for line in lines if line.strip() and not _PROGRESS.match(line)]
         return " | ".join(said[-LAST_LINES:])
-
-
-def _is_progress(line: str) -> bool:
-    return line[:4].strip().removesuffix("%").isdigit() and line[3:6] == "%  "

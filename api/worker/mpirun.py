@@ -134,14 +134,12 @@ class Process(AbstractContextManager["Process"]):
         assert self._watcher.stderr is not None
         with self._watcher.stderr as lines:
             for line in lines:
-                log.add(self._logged(line))
-
-    def _logged(self, line: str) -> str:
-        try:
-            self.progress = ProgressLine.model_validate_json(line)
-        except ValidationError:
-            return line
-        return f"{self.progress.fraction:4.0%}  {self.progress.message}\n"
+                try:
+                    self.progress = ProgressLine.model_validate_json(line)
+                except ValidationError:
+                    log.add(line)
+                else:
+                    log.add_progress(self.progress)
 
 
 def _environment(environment: Mapping[str, str]) -> dict[str, str]:

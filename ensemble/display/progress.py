@@ -198,18 +198,18 @@ def report_progress(console: Console) -> Iterator[Callable[[str], None]]:
     callable
         Takes a line of text.
     """
-    if not console.is_terminal:
-        with compilation_shown(console):
-            yield lambda line: console.print(line, soft_wrap=True, highlight=False, markup=False)
-        return
     columns = (
         BarColumn(pulse_style="cyan"),
         TextColumn("{task.description}", markup=False),
         TimeElapsedColumn(),
     )
-    with compilation_shown(console), Progress(*columns, console=console, transient=True) as progress:
-        task = progress.add_task("", total=None)
-        yield lambda line: progress.update(task, description=line)
+    with compilation_shown(console):
+        if not console.is_terminal:
+            yield lambda line: console.print(line, soft_wrap=True, highlight=False, markup=False)
+            return
+        with Progress(*columns, console=console, transient=True) as progress:
+            task = progress.add_task("", total=None)
+            yield lambda line: progress.update(task, description=line)
 
 
 def _table(snapshot: Snapshot) -> Table:

@@ -135,11 +135,11 @@ class PointSearch(Generic[SomeValueSearch]):
         (str or None, str or None)
             None for an end that is unknown.
         """
-        low, high = (None if end is None else self.outcome(end) for end in bracket)
+        low, high = (None if end is None else self.answer_at(end).outcome for end in bracket)
         return low, high
 
-    def outcome(self, value: float) -> Outcome:
-        """Return the outcome at a value.
+    def answer_at(self, value: float) -> RunAnswer:
+        """Return the answer of the run at a value.
 
         Parameters
         ----------
@@ -148,23 +148,9 @@ class PointSearch(Generic[SomeValueSearch]):
 
         Returns
         -------
-        Outcome
+        RunAnswer
         """
-        return self._answers[value].answer.outcome
-
-    def is_sensitive(self, value: float) -> bool:
-        """Return whether the outcome at a value could be another one.
-
-        Parameters
-        ----------
-        value : float
-            Whose answer is known.
-
-        Returns
-        -------
-        bool
-        """
-        return self._answers[value].answer.sensitive
+        return self._answers[value].answer
 
     def adopt(self, other: PointSearch[Any]) -> None:
         """Take the answers that another search has got from runs at the same numerics.

@@ -135,8 +135,7 @@ class StudyPoint:
     @property
     def pending(self) -> int:
         """How many tasks are handed out."""
-        certifying = 0 if self._certification is None else len(self._certification.pending)
-        return len(self._search.pending) + len(self._confirmation.pending) + certifying
+        return sum(len(search.pending) for search in self._searches)
 
     @property
     def urgency(self) -> tuple[bool, bool, int]:
@@ -156,8 +155,7 @@ class StudyPoint:
     @property
     def known_answers(self) -> int:
         """How many outcomes come from runs made before."""
-        certified = 0 if self._certification is None else self._certification.known_answers
-        return self._search.known_answers + self._confirmation.known_answers + certified
+        return sum(search.known_answers for search in self._searches)
 
     @property
     def runs_left(self) -> float:
@@ -195,8 +193,8 @@ class StudyPoint:
             confirmed=[
                 Confirmed(
                     value=value,
-                    outcome=self._search.outcome(value),
-                    finer_outcome=self._confirmation.outcome(value),
+                    outcome=self._search.answer_at(value).outcome,
+                    finer_outcome=self._confirmation.answer_at(value).outcome,
                 )
                 for value in sorted(self._confirmation.search.sides)
             ],
@@ -233,10 +231,10 @@ class StudyPoint:
         """See to it that the sensitive ends are confirmed; go on where finer runs came out otherwise."""
         search, confirmation = self._search.search, self._confirmation.search
         while search.done:
-            sensitive = filter(self._search.is_sensitive, search.ends_of_changes - confirmation.values)
-            for value in filter(self._can_be_finer, sensitive):
-                confirmation.add(value)
-                self._confirmation.take_known(value)
+            for value in search.ends_of_changes - confirmation.values:
+                if self._search.answer_at(value).sensitive and self._can_be_finer(value):
+                    confirmation.add(value)
+                    self._confirmation.take_known(value)
             contrary = {
                 value: side for value, side in confirmation.sides.items() if side is not search.side_at(value)
             }
@@ -266,11 +264,17 @@ class StudyPoint:
 
     def _outcome(self, value: float) -> Outcome:
         is_finer = value in self._confirmation.search.sides
-        return (self._confirmation if is_finer else self._search).outcome(value)
+        return (self._confirmation if is_finer else self._search).answer_at(value).outcome
+
+    @property
+    def _searches(self) -> tuple[PointSearch[Any], ...]:
+        """All that hand out tasks."""
+        certification = () if self._certification is None else (self._certification,)
+        return (self._search, self._confirmation, *certification)
 
     def _owner(self, task: SearchRun) -> PointSearch[Any]:
-        finer = (self._certification, self._confirmation)
-        return next((s for s in finer if s is not None and s.pending.get(task.value) == task), self._search)
+        latest_first = reversed(self._searches)
+        return next((each for each in latest_first if each.pending.get(task.value) == task), self._search)
 
 
 def _scanned(search: BracketSearch) -> Scanned | None:

@@ -21,6 +21,7 @@ from ensemble.search.study_planner import StudyPlanner
 from ensemble.search.task_queue import RunAnswer
 from solver.analysis.run import Outcome
 from solver.scene import Numerics, Shear
+from tests.ensemble.search.study_runs import trace
 
 GRID = GeometricGrid(0.05)
 INDICES = GRID.within(0.05, 5.0)
@@ -73,23 +74,8 @@ def run_study(
     workers: int = 1,
     choose: Callable[[int], int] = lambda out: 0,
 ) -> list[SearchRun]:
-    """Keep workers busy, finishing at each turn the task that `choose` picks among those out."""
-    out: list[SearchRun] = []
-    made: list[SearchRun] = []
-    while not planner.done:
-        while len(out) < workers and (task := planner.next_task()) is not None:
-            out.append(task)
-        if not out:
-            assert planner.done, "known answers were all that it needed"
-            break
-        made.append(out.pop(choose(len(out))))
-        planner.answer(made[-1], RunAnswer(answer(made[-1])))
-        for unneeded in planner.unneeded_tasks():
-            out.remove(unneeded)
-            planner.cancelled(unneeded)
-    assert not out
-    assert planner.next_task() is None
-    return made
+    """Make all runs of a study, none of which is sensitive."""
+    return trace(planner, lambda task: RunAnswer(answer(task)), workers, choose)
 
 
 def answers(points: list[BoundaryPoint]) -> list[dict[str, Any]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import pytest
@@ -18,6 +17,7 @@ from ensemble.search.study_planner import StudyPlanner
 from ensemble.search.task_queue import RunAnswer
 from solver.analysis.run import Outcome
 from solver.scene import Shear
+from tests.ensemble.search.study_runs import trace
 from tests.ensemble.search.test_certified_studies import answers, is_finer, unknown
 
 
@@ -45,32 +45,6 @@ def study_of(*changes: str) -> Study:
     return load_study(
         "critical-hamaker", ["sweep.values=[0.25, 0.75, 1.5]", "search.tolerance=0.05", *changes]
     )
-
-
-def trace(
-    planner: StudyPlanner,
-    physics: Callable[[SearchRun], RunAnswer],
-    workers: int = 1,
-    choose: Callable[[int], int] = lambda out: 0,
-) -> list[SearchRun]:
-    """Make all runs of a study, of the tasks that are out the one that `choose` picks."""
-    out: list[SearchRun] = []
-    made: list[SearchRun] = []
-    while not planner.done:
-        while len(out) < workers and (task := planner.next_task()) is not None:
-            out.append(task)
-        if not out:
-            assert planner.done, "known answers were all that it needed"
-            break
-        made.append(out.pop(choose(len(out))))
-        planner.answer(made[-1], physics(made[-1]))
-        for unneeded in planner.unneeded_tasks():
-            out.remove(unneeded)
-            planner.cancelled(unneeded)
-    assert not out
-    assert planner.next_task() is None
-    assert planner.runs_left == 0
-    return made
 
 
 @pytest.mark.parametrize("certify", ["false", "true"])
