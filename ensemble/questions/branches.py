@@ -187,13 +187,7 @@ def settled_answer(scene: Scene, path: Path | None) -> Answer:
         breaking = symmetry_breaking(run)
     except ArithmeticError as error:
         return _NoAnswer(str(error))
-    record = {
-        "outcome": run.outcome,
-        "period": run.period,
-        "stable": breaking.stable,
-        "growth_rate": breaking.growth_rate,
-        "growth_factor": breaking.factor,
-    }
+    record = {"outcome": run.outcome, "period": run.period} | breaking.record()
     return _SteadyAnswer(record, run_key(scene))
 
 

@@ -62,6 +62,10 @@ class SymmetryBreaking:
         """Whether it decays."""
         return self.growth_rate < 0
 
+    def record(self) -> dict[str, bool | float]:
+        """Return what is told of it, by name: in the answer of a command and in a report."""
+        return {"stable": self.stable, "growth_rate": self.growth_rate, "growth_factor": self.factor}
+
 
 def symmetry_breaking(run: Run) -> SymmetryBreaking:
     """Follow a difference that breaks the symmetry of the motion to which a pair has settled.
