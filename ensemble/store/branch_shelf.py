@@ -1,4 +1,4 @@
-"""Branches of steady states in a store: one zarr v3 group each, in the directory ``branches``.
+"""Branches of steady states in a store: one group of arrays each, in the directory ``branches``.
 
 A branch is written beside the runs that are being written, flushed to disk and renamed into ``branches``.
 The rename makes it exist.  There are few branches, so the directory itself is their catalog.
@@ -12,18 +12,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import zarr
 from pydantic import ValidationError
-from zarr.storage import LocalStore
 
 from ensemble.disk import flush, flush_tree, locked
 from ensemble.errors import StoreError
 from ensemble.search.branch_summary import BranchSummary, branch_key
-from ensemble.store.archive import write_array
 from ensemble.store.branch_record import branch_arrays
 from ensemble.store.run_record import first_problem
 from ensemble.store.staging import STORE_LOCK, is_own_directory
-from solver.analysis.run import Array
+from ensemble.store.zarr_groups import StoredGroup, write_group
 from solver.revision import RESULTS_REVISION
 
 if TYPE_CHECKING:
@@ -56,10 +53,7 @@ class BranchShelf:
             A directory of this process, which is swept if the process dies.
         """
         partial = unfinished / f"{summary.key}.branch"
-        attributes = summary.model_dump(mode="json")
-        group = zarr.create_group(LocalStore(partial), zarr_format=3, attributes=attributes)
-        for name, array in branch_arrays(branch).items():
-            write_array(group, name, array)
+        write_group(partial, summary.model_dump(mode="json"), branch_arrays(branch))
         flush_tree(partial)
         with locked(self._store / STORE_LOCK):
             self._branches.mkdir(exist_ok=True)
@@ -98,7 +92,7 @@ class BranchShelf:
         StoreError
             If it is not there, or its files are damaged.
         """
-        return _summary(self._branches / key, _group(self._branches / key))
+        return _summary(StoredGroup(self._branches / key, "branch"))
 
     def summaries(self) -> list[BranchSummary]:
         """Return the summaries of all branches, oldest first.
@@ -137,42 +131,17 @@ class BranchShelf:
         return sorted(entry.name for entry in self._branches.iterdir() if is_own_directory(entry))
 
 
-def _group(directory: Path) -> zarr.Group:
+def _summary(group: StoredGroup) -> BranchSummary:
     try:
-        return zarr.open_group(LocalStore(directory, read_only=True), mode="r", zarr_format=3)
-    except (OSError, ValueError, KeyError) as error:
-        raise StoreError(f"branch {directory.name}: no readable group ({error})") from error
-
-
-def _summary(directory: Path, group: zarr.Group) -> BranchSummary:
-    try:
-        return BranchSummary.model_validate(dict(group.attrs))
+        return BranchSummary.model_validate(group.attributes)
     except ValidationError as error:
-        raise StoreError(
-            f"branch {directory.name}: unreadable attributes ({first_problem(error)})"
-        ) from error
-
-
-def _read(directory: Path, group: zarr.Group, name: str) -> Array:
-    place = f"branch {directory.name}: array {name}"
-    # Metadata and codecs fail in many ways (zarr, numcodecs, JSON); all of them mean the same here.
-    try:
-        array = group[name]
-        if not isinstance(array, zarr.Array):
-            raise StoreError(f"{place} is not an array")
-        if array.nchunks_initialized < array.nchunks:
-            raise StoreError(f"{place} has lost chunks")
-        return np.asarray(array[...], dtype=np.float64)
-    except StoreError:
-        raise
-    except Exception as error:
-        raise StoreError(f"{place} cannot be read ({error})") from error
+        raise StoreError(f"{group.name}: unreadable attributes ({first_problem(error)})") from error
 
 
 def _problems(directory: Path) -> list[str]:
     """Return what is wrong with the files of a branch."""
-    name, group = f"branch {directory.name}", _group(directory)
-    summary = _summary(directory, group)
+    group = StoredGroup(directory, "branch")
+    name, summary = group.name, _summary(group)
     problems = []
     if summary.key != directory.name:
         problems.append(f"{name}: its attributes have the key {summary.key}")
@@ -185,7 +154,7 @@ def _problems(directory: Path) -> list[str]:
         if not points:
             continue
         values, angles, centers = (
-            _read(directory, group, f"{prefix}{array}") for array in ("parameter", "tangent_angle", "center")
+            group.whole(f"{prefix}{array}") for array in ("parameter", "tangent_angle", "center")
         )
         if not np.array_equal(values, [point.value for point in points]):
             problems.append(f"{name}: array {prefix}parameter differs from its attributes")

@@ -8,7 +8,7 @@ import numpy as np
 
 from ensemble.config.run_key import run_key
 from ensemble.errors import StoreError
-from ensemble.store.archive import read_run, read_summary
+from ensemble.store.archive import StoredArrays
 from ensemble.store.run_record import RunSummary
 from solver.analysis.run import Outcome, Run
 from solver.revision import RESULTS_REVISION
@@ -31,7 +31,8 @@ def check_run(directory: Path, summary: RunSummary) -> list[str]:
     """
     name = f"run {directory.name}"
     try:
-        stored, run = read_summary(directory), read_run(directory)
+        arrays = StoredArrays(directory)
+        stored, run = arrays.summary, arrays.run()
     except StoreError as error:
         return [str(error)]
     problems = [f"{name}: {problem}" for problem in array_problems(run)]

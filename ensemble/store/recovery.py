@@ -142,11 +142,11 @@ def _whole_run(directory: Path) -> RunSummary:
     StoreError
         If they are not those of a whole run.
     """
-    from ensemble.store.archive import read_run, read_summary
+    from ensemble.store.archive import StoredArrays
     from ensemble.store.check import array_problems
 
-    summary = read_summary(directory)
-    problems = array_problems(read_run(directory))
+    stored = StoredArrays(directory)
+    problems = array_problems(stored.run())
     if problems:
         raise StoreError(f"run {directory.name}: {problems[0]}")
-    return summary
+    return stored.summary

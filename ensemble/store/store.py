@@ -444,11 +444,7 @@ class Store(AbstractContextManager["Store"]):
         StoreError
             If its files are damaged.
         """
-        from ensemble.store.archive import read_run
-
-        if not self.contains(key):
-            raise NotStored(f"run: there is no run {key} in {self.path}")
-        return read_run(self._runs / key)
+        return self.arrays(key).run()
 
     def arrays(self, key: str) -> StoredArrays:
         """Open the arrays of a committed run, to read some of their rows.

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from ensemble.store import Store
 from tests.api.servers import client_of
+from tests.ensemble.group_files import unpack
 from tests.ensemble.runs import shear_run
 from tests.full_disks import ROOM, filled, small_disk
 
@@ -25,7 +26,7 @@ DAMAGES: dict[str, Callable[[Path], object]] = {
 def test_a_damaged_run_is_said_to_be_damaged(store: Path) -> None:
     with Store.open(store) as opened:
         key = opened.save(shear_run())
-    run = store / "runs" / key
+    run = unpack(store / "runs" / key)
     kept = shutil.copytree(run, store.with_name("kept"))
     with client_of(store) as client:
         for name, damage in DAMAGES.items():

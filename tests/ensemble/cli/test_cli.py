@@ -17,6 +17,7 @@ import pytest
 from ensemble.config.documents import load_scene, load_study, preset_names
 from ensemble.config.run_key import run_key
 from ensemble.questions import INCOMPLETE_STATUS
+from tests.ensemble.group_files import unpacked
 
 QUICK_SCENE = ("doublet-shear", "--set=numerics.points=32", "--set=numerics.tolerance=1e-3")
 # Standard output of one JSON document, null where the scene has no such quantity.
@@ -391,8 +392,10 @@ def test_export_writes_one_file(ensemble, stored_run, tmp_path):
 def test_check_finds_damage(ensemble, stored_run, tmp_path):
     store = shutil.copytree(stored_run[0], tmp_path / "store")
     assert ensemble("check", f"--store={store}").returncode == 0
-    (chunk, *_) = sorted((store / "runs").glob("*/gap/c/0"))
-    chunk.write_bytes(chunk.read_bytes()[:-1] + b"?")
+    (directory, *_) = sorted((store / "runs").iterdir())
+    with unpacked(directory) as files:
+        chunk = files / "gap" / "c" / "0"
+        chunk.write_bytes(chunk.read_bytes()[:-1] + b"?")
     damaged = ensemble("check", f"--store={store}", "--json")
     assert damaged.returncode == 1
     (problem,) = json.loads(damaged.stdout)["problems"]

@@ -8,10 +8,12 @@ import shutil
 import numpy as np
 import pytest
 import xarray
+from zarr.storage import ZipStore
 
 from ensemble.figures.bifurcation import bifurcation_diagram
 from ensemble.questions import INCOMPLETE_STATUS
 from ensemble.store import Store, StoreError
+from tests.ensemble.group_files import unpacked
 
 TREADING = (
     "vesicle-shear",
@@ -81,7 +83,8 @@ def test_a_stored_branch_is_shown_listed_checked_and_drawn(ensemble, followed, t
     assert file.stat().st_size > 1000
     with Store.existing(store) as opened:
         assert opened.check() == []
-    arrays = xarray.open_zarr(store / "branches" / key, consolidated=False).load()
+    archive = ZipStore(store / "branches" / key / "zarr.zip", mode="r")
+    arrays = xarray.open_zarr(archive, consolidated=False).load()
     assert arrays["tangent_angle"].dims == ("parameter", "vesicle", "point")
     np.testing.assert_array_equal(
         arrays["parameter"].values, [point["parameter"] for point in document["branch"]]
@@ -92,9 +95,9 @@ def test_a_damaged_branch_is_noticed(followed, tmp_path):
     store, document = followed
     copy = tmp_path / "copy"
     shutil.copytree(store, copy)
-    chunks = (copy / "branches" / document["key"] / "tangent_angle" / "c").rglob("*")
-    chunk = next(path for path in chunks if path.is_file())
-    chunk.write_bytes(chunk.read_bytes()[:-1] + b"?")
+    with unpacked(copy / "branches" / document["key"]) as files:
+        chunk = next(path for path in (files / "tangent_angle" / "c").rglob("*") if path.is_file())
+        chunk.write_bytes(chunk.read_bytes()[:-1] + b"?")
     with Store.existing(copy) as opened:
         assert any(document["key"] in problem for problem in opened.check())
         opened.branches.summary(document["key"])

@@ -9,9 +9,11 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from ensemble.store import Store, StoreError
+from tests.ensemble.group_files import unpack
 from tests.ensemble.runs import assert_same_run, shear_run
 
 RUN = shear_run(samples=8, frames=2)
@@ -19,11 +21,20 @@ RUN = replace(RUN, series={name: RUN.series[name] for name in ("time", "gap")})
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def archived(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A store with one run."""
     path = tmp_path_factory.mktemp("whole") / "store"
     with Store.open(path) as store:
         store.save(RUN)
+    return path
+
+
+@pytest.fixture(scope="module")
+def whole(archived: Path) -> Path:
+    """The same as earlier versions wrote it, with many files."""
+    path = shutil.copytree(archived, archived.with_name("unpacked"))
+    (run,) = (path / "runs").iterdir()
+    unpack(run)
     return path
 
 
@@ -109,6 +120,30 @@ def test_files(whole: Path, tmp_path: Path, damage: Callable[[Path], None]) -> N
         with Store.existing(store) as opened:
             assert opened.check(), f"{damage.__name__} {file.name}"
         shutil.rmtree(store)
+
+
+@pytest.mark.parametrize(
+    "damage", [lose, cut, empty, overwrite, turn_into_directory], ids=lambda f: f.__name__
+)
+def test_an_archive(archived: Path, tmp_path: Path, damage: Callable[[Path], None]) -> None:
+    store = shutil.copytree(archived, tmp_path / "store")
+    damage(next((store / "runs").glob("*/zarr.zip")))
+    named_or_unharmed(store)
+    with Store.existing(store) as opened:
+        assert opened.check()
+
+
+def test_any_byte_of_an_archive(archived: Path, tmp_path: Path) -> None:
+    """A wrong byte is found, or changes nothing that is read.  Takes 3 s."""
+    store = shutil.copytree(archived, tmp_path / "store")
+    archive = next((store / "runs").glob("*/zarr.zip"))
+    content = archive.read_bytes()
+    random = np.random.default_rng(0)
+    for place in [*random.integers(0, len(content), 40), *range(len(content) - 22, len(content))]:
+        changed = bytearray(content)
+        changed[place] ^= 1 << random.integers(0, 8)
+        archive.write_bytes(changed)
+        named_or_unharmed(store)
 
 
 @pytest.mark.parametrize(

@@ -19,6 +19,7 @@ import pytest
 from ensemble.store import Store, StoreError, StoreInputError, staging
 from ensemble.store.merge import merge
 from tests.ensemble.catalog_conformance import NOON, boundary
+from tests.ensemble.group_files import unpacked
 from tests.ensemble.runs import assert_same_run, shear_run, shear_scene
 
 
@@ -78,7 +79,8 @@ def test_a_run_that_is_torn_and_not_in_the_catalog_is_moved_and_not_deleted(tmp_
     path, other = filled(tmp_path / "store", 0), filled(tmp_path / "other", 1)
     (key,) = keys(other)
     shutil.copytree(other / "runs" / key, path / "runs" / key)
-    (path / "runs" / key / "gap" / "c" / "0").unlink()
+    with unpacked(path / "runs" / key) as files:
+        (files / "gap" / "c" / "0").unlink()
     torn = contents(path / "runs" / key)
     filled(path)
     assert not (path / "runs" / key).exists()
@@ -91,10 +93,11 @@ def test_a_run_of_a_newer_version_is_left_alone_and_named(
     path, other = filled(tmp_path / "store", 0), filled(tmp_path / "other", 1)
     (key,) = keys(other)
     shutil.copytree(other / "runs" / key, path / "runs" / key)
-    metadata = json.loads((path / "runs" / key / "zarr.json").read_text())
-    metadata["attributes"]["a_field_of_the_future"] = 1
-    metadata["attributes"]["versions"]["vesicle-ensemble"] = "9.0"
-    (path / "runs" / key / "zarr.json").write_text(json.dumps(metadata))
+    with unpacked(path / "runs" / key) as files:
+        metadata = json.loads((files / "zarr.json").read_text())
+        metadata["attributes"]["a_field_of_the_future"] = 1
+        metadata["attributes"]["versions"]["vesicle-ensemble"] = "9.0"
+        (files / "zarr.json").write_text(json.dumps(metadata))
     before = contents(path / "runs" / key)
     filled(path)
     assert contents(path / "runs" / key) == before
@@ -163,7 +166,8 @@ def test_a_lost_or_damaged_catalog_is_refused_and_rebuilt(
 def test_repair_sets_damaged_runs_aside_so_that_they_are_made_again(tmp_path: Path) -> None:
     path = filled(tmp_path / "store", 0, 1, 2)
     whole, damaged, missing = sorted(keys(path))
-    (path / "runs" / damaged / "gap" / "c" / "0").unlink()
+    with unpacked(path / "runs" / damaged) as files:
+        (files / "gap" / "c" / "0").unlink()
     kept = contents(path / "runs" / damaged)
     shutil.rmtree(path / "runs" / missing)
     with Store.existing(path) as store:

@@ -14,6 +14,7 @@ from ensemble.questions.scene_question import run_document
 from ensemble.store import Store, run_record
 from ensemble.store.run_record import RunSummary
 from solver import RESULTS_REVISION
+from tests.ensemble.group_files import unpack
 from tests.ensemble.runs import assert_same_run, shear_run, shear_scene
 
 
@@ -51,5 +52,6 @@ def test_a_record_from_before_revisions_were_counted_is_read() -> None:
 def test_a_stored_run_names_its_revision(tmp_path: Path) -> None:
     with Store.open(tmp_path / "store") as store:
         key = store.save(shear_run())
-    attributes = json.loads((tmp_path / "store" / "runs" / key / "zarr.json").read_text())["attributes"]
+    directory = unpack(tmp_path / "store" / "runs" / key)
+    attributes = json.loads((directory / "zarr.json").read_text())["attributes"]
     assert attributes["results_revision"] == RESULTS_REVISION

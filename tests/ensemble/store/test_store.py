@@ -10,20 +10,28 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
+from zipfile import ZipFile
 
 import numpy as np
 import pytest
 import xarray
+import zarr
+from zarr.codecs import ZstdCodec
+from zarr.storage import LocalStore, ZipStore
 
 from ensemble.config.run_key import run_key
 from ensemble.store import Store, StoreError, StoreInputError
+from ensemble.store.run_record import RunSummary, arrays
+from ensemble.store.zarr_groups import ARCHIVE
 from solver.analysis.run import Outcome, Run
 from solver.scene import Criteria, Numerics
 from solver.simulation.simulate import simulate
+from tests.ensemble.group_files import unpack, unpacked
 from tests.ensemble.runs import assert_same_run, failed_run, shear_run, shear_scene
 
 PRELUDE = """
@@ -178,14 +186,64 @@ def test_frames_of_another_number_of_points_are_reported(store: Store) -> None:
 
 def test_long_arrays_are_stored_in_several_chunks(store: Store) -> None:
     key = store.save(shear_run(shear_scene(points=256), samples=3, frames=600))
-    chunks = [path for path in (store.path / "runs" / key / "tension" / "c").rglob("*") if path.is_file()]
-    assert len(chunks) > 1
+    with ZipFile(store.path / "runs" / key / ARCHIVE) as archive:
+        assert len([name for name in archive.namelist() if name.startswith("tension/c/")]) > 1
+
+
+def test_a_run_is_one_file(store: Store) -> None:
+    key = store.save(shear_run(shear_scene(points=256), samples=3, frames=600))
+    assert [path.name for path in (store.path / "runs" / key).rglob("*")] == [ARCHIVE]
+
+
+def write_as_before(directory: Path, run: Run, created: datetime) -> None:
+    """Write a run as version 0.3 did: a file for each document and each chunk."""
+    attributes = RunSummary.of(run).model_copy(update={"created": created}).document()
+    group = zarr.create_group(LocalStore(directory), zarr_format=3, attributes=attributes)
+    for name, array in arrays(run).items():
+        group.create_array(
+            name,
+            data=array.values,
+            chunks=tuple(max(length, 1) for length in array.values.shape),
+            compressors=ZstdCodec(level=3, checksum=True),
+            dimension_names=array.dimensions,
+            fill_value=float("nan"),
+            config={"write_empty_chunks": True},
+        )
+
+
+@pytest.mark.parametrize("run", [shear_run(), failed_run()], ids=["shear", "failed"])
+def test_a_store_of_an_earlier_version_is_read_as_it_is(tmp_path: Path, run: Run) -> None:
+    path = tmp_path / "store"
+    Store.open(path).close()
+    directory = path / "runs" / run_key(run.scene)
+    write_as_before(directory, run, datetime(2025, 1, 2, tzinfo=UTC))
+    before = {file: file.read_bytes() for file in directory.rglob("*") if file.is_file()}
+    assert len(before) > 12
+    with Store.open(path) as store:
+        assert_same_run(store.load(directory.name), run)
+        assert store.check() == []
+        assert [summary.key for summary in store.summaries(["created<2025-01-03"])] == [directory.name]
+        times = store.load(directory.name).frames.time
+        assert np.array_equal(store.arrays(directory.name).rows("frame_time", range(1)), times[:1])
+    assert before == {file: file.read_bytes() for file in directory.rglob("*") if file.is_file()}
+
+
+def test_what_is_unpacked_is_what_earlier_versions_wrote(store: Store, tmp_path: Path) -> None:
+    run = shear_run()
+    directory = unpack(store.path / "runs" / store.save(run))
+    write_as_before(tmp_path / "before", run, store.summary(directory.name).created)
+    found = [
+        {str(file.relative_to(root)): file.read_bytes() for file in root.rglob("*") if file.is_file()}
+        for root in (directory, tmp_path / "before")
+    ]
+    assert found[0] == found[1]
 
 
 def test_xarray_opens_a_run_as_one_data_set(store: Store) -> None:
     run = shear_run()
     key = store.save(run)
-    with xarray.open_zarr(store.path / "runs" / key, consolidated=False) as data:
+    archive = ZipStore(store.path / "runs" / key / ARCHIVE, mode="r")
+    with xarray.open_zarr(archive, consolidated=False) as data:
         assert set(data.coords) == {"time", "frame_time"}
         assert data["gap"].dims == ("time",)
         assert data["tangent_angle"].dims == ("frame_time", "vesicle", "point")
@@ -332,7 +390,7 @@ def test_death_between_rename_and_catalog(store: Store) -> None:
         assert_same_run(recovered.load(key), run)
         assert recovered.check() == []
 
-    (store.path / "runs" / key / "zarr.json").write_text("torn")
+    (store.path / "runs" / key / ARCHIVE).write_text("torn")
     assert store.save(run) == key
     assert_same_run(store.load(key), run)
 
@@ -376,6 +434,12 @@ def shorten_an_array(run: Path) -> None:
     (run / "gap" / "zarr.json").write_text(json.dumps(metadata))
 
 
+Layout = Callable[[Path], AbstractContextManager[Path]]
+
+
+@pytest.mark.parametrize(
+    "layout", [unpacked, lambda directory: nullcontext(unpack(directory))], ids=["archive", "files"]
+)
 @pytest.mark.parametrize(
     ("damage", "problem"),
     [
@@ -388,10 +452,11 @@ def shorten_an_array(run: Path) -> None:
     ],
 )
 def test_damage_is_reported_and_never_read(
-    store: Store, damage: Callable[[Path], object], problem: str
+    store: Store, layout: Layout, damage: Callable[[Path], object], problem: str
 ) -> None:
     whole, damaged = store.save(numbered_run(0)), store.save(numbered_run(1))
-    damage(store.path / "runs" / damaged)
+    with layout(store.path / "runs" / damaged) as files:
+        damage(files)
     problems = store.check()
     assert len(problems) == 1
     assert damaged in problems[0]
@@ -407,7 +472,8 @@ def test_damage_is_reported_and_never_read(
 )
 def test_inconsistency_is_reported(store: Store, damage: Callable[[Path], object], problem: str) -> None:
     key = store.save(shear_run())
-    damage(store.path / "runs" / key)
+    with unpacked(store.path / "runs" / key) as files:
+        damage(files)
     (reported,) = store.check()
     assert problem in reported
 
