@@ -38,6 +38,23 @@ Filters = Annotated[
     list[str],
     typer.Option(metavar="CONDITION", help="For example flow.rate>=0.5 or outcome=bound.  Repeatable."),
 ]
+Sort = Annotated[
+    str | None,
+    typer.Option(
+        metavar="PATH",
+        help="Field to sort by; -PATH for the largest first.  Left out, the newest come first.",
+        show_default=False,
+    ),
+]
+Limit = Annotated[int, typer.Option(min=0, metavar="N", help="List at most so many; 0 lists all.")]
+Columns = Annotated[
+    list[str],
+    typer.Option(
+        "--columns",
+        metavar="PATH,…",
+        help="Fields to show, named as for --where.  Repeatable.",
+    ),
+]
 RanksPerRun = Annotated[
     str | None,
     typer.Option(

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from textwrap import indent
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import typer
@@ -13,6 +16,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from ensemble.questions import Answer
+    from ensemble.store.columns import ListColumn
 
 
 def print_json(document: Any) -> None:
@@ -24,6 +28,41 @@ def print_json(document: Any) -> None:
         JSON data; JSON has no word for NaN or infinity.
     """
     print(json.dumps(document, indent=2, allow_nan=False))
+
+
+def print_json_array(documents: Iterable[Any]) -> None:
+    """Print a JSON array, one element after the other.
+
+    Parameters
+    ----------
+    documents : iterable of object
+        JSON data.
+    """
+    opening = "["
+    for document in documents:
+        print(f"{opening}\n{indent(json.dumps(document, indent=2, allow_nan=False), '  ')}", end="")
+        opening = ","
+    print("[]" if opening == "[" else "\n]")
+
+
+def print_list(columns: Sequence[ListColumn], documents: Iterable[Mapping[str, Any]]) -> None:
+    """Print a list as a table or, when not on a terminal, as tab-separated values, one line after the other.
+
+    Parameters
+    ----------
+    columns : sequence of ListColumn
+        What is shown.
+    documents : iterable of mapping
+        The records, which are read as they are printed.
+    """
+    from ensemble.display.result_tables import list_cell, list_table
+
+    if sys.stdout.isatty():
+        print_table(list_table(columns, documents))
+        return
+    print("\t".join(column.heading for column in columns))
+    for document in documents:
+        print("\t".join(list_cell(column.value(document)) for column in columns))
 
 
 def print_table(table: Table) -> None:

@@ -2,20 +2,34 @@
 
 from __future__ import annotations
 
+import os
+import sys
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ensemble.cli.options import AsJson, Filters, StorePath
-from ensemble.cli.printing import print_json, print_table
-from ensemble.config.defaults import DEFAULT_STORE
+from ensemble.cli.options import (
+    AsJson,
+    Columns,
+    Filters,
+    Limit,
+    ProgressAs,
+    ProgressFormat,
+    Sort,
+    StorePath,
+)
+from ensemble.cli.printing import print_json, print_json_array, print_list, print_table
+from ensemble.config.defaults import DEFAULT_STORE, LISTED
 from ensemble.errors import refusing
 
 if TYPE_CHECKING:
     from ensemble.questions import Question, StoredAnswer, StoredAnswers
     from ensemble.questions.branches import StoredBranches
     from ensemble.store import Store
+    from ensemble.store.listing import Listing
+    from ensemble.store.verification import OnProgress
 
 
 def _collections() -> list[str]:
@@ -41,22 +55,33 @@ def query(  # numpydoc ignore=PR01
         ),
     ],
     where: Filters = [],  # noqa: B006  typer copies it
+    sort: Sort = None,
+    limit: Limit = LISTED,
+    columns: Columns = [],  # noqa: B006
     store: StorePath = DEFAULT_STORE,
     as_json: AsJson = False,
 ) -> None:
     """List the runs, the boundaries or the branches of steady states of a store."""
+    from ensemble.store.listing import Listing
+
+    # One more, to know whether there are more.
+    listing = Listing(tuple(where), sort, limit + 1 if limit else None)
+    paths = [path.strip() for column in columns for path in column.split(",")]
     with refusing(), _existing(store) as opened:
-        answers = _all_stored(opened, collection, where)
-    if as_json:
-        print_json(answers.json_documents)
-    else:
-        print_table(answers.table)
+        answers = _all_stored(opened, collection, listing, paths)
+        documents = islice(answers.json_documents, limit or None)
+        if as_json:
+            print_json_array(documents)
+        else:
+            print_list(answers.columns, documents)
+        if next(answers.json_documents, None) is not None:
+            print(f"ensemble: there are more than {limit}; --limit 0 lists all", file=sys.stderr)
 
 
-def _all_stored(store: Store, collection: str, where: list[str]) -> StoredAnswers:
+def _all_stored(store: Store, collection: str, listing: Listing, columns: list[str]) -> StoredAnswers:
     for shelf in _shelves():
         if shelf.collection == collection:
-            return shelf.all_stored(store, where)
+            return shelf.all_stored(store, listing, columns)
     raise ValueError(f"{collection!r} — must be one of {', '.join(_collections())}")
 
 
@@ -105,15 +130,27 @@ def check(  # numpydoc ignore=PR01
             help="Rebuild a lost or damaged catalog from the runs, and set damaged runs aside in lost+found.",
         ),
     ] = False,
+    processes: Annotated[
+        int | None,
+        typer.Option(min=1, metavar="N", help="How many verify at once; left out, one for each processor."),
+    ] = None,
+    progress: ProgressAs = ProgressFormat.TEXT,
     as_json: AsJson = False,
 ) -> None:
-    """Verify every run, boundary and branch of a store; the exit status is 1 if anything is wrong."""
-    from ensemble.store import Store
+    """Verify every run, boundary and branch of a store; the exit status is 1 if anything is wrong.
 
-    with refusing():
-        done = Store.repair(store) if repair else []
+    A check that was interrupted goes on where it was, within a day.
+    """
+    from rich.console import Console
+
+    from ensemble.display.check_progress import check_lines, check_progress
+
+    at_once = processes or len(os.sched_getaffinity(0))
+    display = check_lines if progress is ProgressFormat.JSON else check_progress
+    with refusing(), display(Console(stderr=True)) as on_progress:
+        done = _repaired(store, on_progress, at_once) if repair else []
         with _existing(store) as opened:
-            problems = opened.check()
+            problems = opened.check(on_progress, at_once)
     if as_json:
         print_json({"store": str(store), "done": done, "problems": problems})
     else:
@@ -121,12 +158,18 @@ def check(  # numpydoc ignore=PR01
     raise typer.Exit(1 if problems else 0)
 
 
+def _repaired(store: Path, on_progress: OnProgress, processes: int) -> list[str]:
+    from ensemble.store.repair import repair
+
+    return repair(store, on_progress, processes)
+
+
 def merge(  # numpydoc ignore=PR01
-    source: Annotated[Path, typer.Argument(metavar="STORE", help="Store whose runs are copied.")],
+    source: Annotated[Path, typer.Argument(metavar="STORE", help="Store that is copied.")],
     into: Annotated[Path, typer.Option(metavar="DIR", help="Store that takes them.")],
     as_json: AsJson = False,
 ) -> None:
-    """Copy the runs and boundaries of one store into another; of a boundary in both, the newer one stays."""
+    """Copy all that one store has into another; of a boundary in both, the newer one stays."""
     from ensemble.store import Store
     from ensemble.store.merge import merge as copy
 
@@ -135,7 +178,7 @@ def merge(  # numpydoc ignore=PR01
     if as_json:
         print_json(merged._asdict())
     else:
-        copied = f"copied {merged.runs} runs and {merged.boundaries} boundaries"
+        copied = f"copied {merged.runs} runs, {merged.boundaries} boundaries and {merged.branches} branches"
         print(f"{copied}; {merged.known_runs} runs were there already")
 
 

@@ -7,3 +7,4 @@ from typing import Final
 
 DEFAULT_STORE: Final = Path("ensemble-store")
 DEFAULT_STUDY: Final = "critical-hamaker"
+LISTED: Final = 100  # records of a list unless its reader asks for more

@@ -131,7 +131,28 @@ def parameter_value(scene: Scene, path: str) -> float:
     ValueError
         If there is no number at the path, or there are different ones.
     """
-    document = scene.model_dump()
+    return number_at(scene.model_dump(), path)
+
+
+def number_at(document: Mapping[str, Any], path: str) -> float:
+    """Return the number at a dotted path of a document.
+
+    Parameters
+    ----------
+    document : mapping
+        Nested tables and arrays.
+    path : str
+        Dotted path.  It may name several places, which must then hold the same number.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    ValueError
+        If there is no number at the path, or there are different ones.
+    """
     values = {value_at(document, location) for location in locations(document, path)}
     (value, *others) = values
     if others or not isinstance(value, int | float):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from rich.markup import escape
@@ -32,34 +31,6 @@ def branch_table(summary: BranchSummary) -> Table:
     for name, points in (("fold", summary.folds), ("crossing", summary.crossings)):
         for point in points:
             table.add_row(*_cells(point, name))
-    return table
-
-
-def branches_table(summaries: Sequence[BranchSummary]) -> Table:
-    """Return a table of branches, with a row for each.
-
-    Parameters
-    ----------
-    summaries : sequence of BranchSummary
-
-    Returns
-    -------
-    Table
-    """
-    headings = ["parameter", "from", "points", "folds", "crossings"]
-    table = Table(
-        Column("branch", no_wrap=True, overflow="ignore"),
-        *(Column(heading, overflow="fold") for heading in headings),
-    )
-    for summary in summaries:
-        folds, crossings = (
-            ", ".join(f"{point.value:.10g}" for point in points) or _ABSENT
-            for points in (summary.folds, summary.crossings)
-        )
-        first = summary.branch[0].value
-        table.add_row(
-            summary.key, summary.parameter, f"{first:.6g}", str(len(summary.branch)), folds, crossings
-        )
     return table
 
 

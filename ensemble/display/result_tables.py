@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rich.markup import escape
@@ -10,7 +10,7 @@ from rich.table import Column, Table
 
 if TYPE_CHECKING:
     from ensemble.search.boundary import Boundary, BoundaryPoint, OutcomeChange
-    from ensemble.store.run_record import RunSummary
+    from ensemble.store.columns import ListColumn
 
 _ABSENT = "–"
 
@@ -135,56 +135,40 @@ def fields_table(document: Mapping[str, Any]) -> Table:
     return table
 
 
-def runs_table(summaries: Sequence[RunSummary]) -> Table:
-    """Return a table of runs, with a row for each.
+def list_table(columns: Sequence[ListColumn], documents: Iterable[Mapping[str, Any]]) -> Table:
+    """Return a table of records, with a row for each.
 
     Parameters
     ----------
-    summaries : sequence of RunSummary
-        Of the runs.
+    columns : sequence of ListColumn
+        The first one holds the key.
+    documents : iterable of mapping
+        The records.
 
     Returns
     -------
     Table
     """
-    table = Table(_whole("run"), *map(_folded, ["outcome", "flow", "rate", "hamaker", "revision"]))
-    for summary in summaries:
-        flow, adhesion = summary.scene.flow, summary.scene.adhesion
-        table.add_row(
-            summary.key,
-            summary.outcome,
-            _ABSENT if flow is None else flow.kind,
-            _ABSENT if flow is None else _number(flow.rate),
-            _ABSENT if adhesion is None else _number(adhesion.hamaker),
-            _number(summary.results_revision),
-        )
+    first, *others = (column.heading for column in columns)
+    table = Table(_whole(first), *map(_folded, others))
+    for document in documents:
+        table.add_row(*(escape(list_cell(column.value(document))) for column in columns))
     return table
 
 
-def boundaries_table(boundaries: Sequence[Boundary]) -> Table:
-    """Return a table of boundaries, with a row for each.
+def list_cell(value: Any) -> str:
+    """Write a value of a list.
 
     Parameters
     ----------
-    boundaries : sequence of Boundary
-        The boundaries.
+    value : object
+        JSON data.
 
     Returns
     -------
-    Table
+    str
     """
-    table = Table(_whole("boundary"), *map(_folded, ["name", "points", "converged", "certified", "updated"]))
-    for boundary in boundaries:
-        converged = sum(point.status == "converged" for point in boundary.points)
-        table.add_row(
-            boundary.study_key,
-            escape(boundary.name),
-            str(len(boundary.points)),
-            str(converged),
-            str(sum(point.certified for point in boundary.points)),
-            f"{boundary.updated:%Y-%m-%d %H:%M:%S}",
-        )
-    return table
+    return ", ".join(map(_number, value)) if isinstance(value, list) else _number(value)
 
 
 def _folded(heading: str) -> Column:

@@ -17,6 +17,7 @@ from ensemble.search.batch import Batch
 from ensemble.search.point_search import SearchRun
 from ensemble.search.study_planner import StudyPlanner
 from ensemble.search.task_queue import Task, TaskQueue
+from ensemble.store.listing import ParameterRange
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
@@ -93,7 +94,12 @@ def run_study(
 
     def begin() -> StudyPlanner:
         kept = whole_store(store)
-        return StudyPlanner(study, kept.answer, (summary.scene for summary in kept.summaries()))
+        sweep, search = study.sweep, study.search
+        made = kept.parameters_within(
+            ParameterRange(sweep.parameter, min(sweep.values), max(sweep.values)),
+            ParameterRange(search.parameter, *search.limits),
+        )
+        return StudyPlanner(study, kept.answer, ((at, value) for at, value in made))
 
     def publish(planner: StudyPlanner, progress: JobProgress[SearchRun]) -> None:
         boundary = planner.boundary()

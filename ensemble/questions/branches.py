@@ -9,6 +9,7 @@ import time as clock
 from collections.abc import Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
+from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
     from ensemble.search.branch_summary import BranchSummary
     from ensemble.store import Store
+    from ensemble.store.listing import Listing
     from solver.analysis.run import Run
     from solver.simulation.steady_scenes import Shapes
 
@@ -359,27 +361,31 @@ class StoredBranches:
         return _StoredBranch(store.branches.summary(keys[0])) if len(keys) == 1 else None
 
     @classmethod
-    def all_stored(cls, store: Store, where: Sequence[str]) -> StoredAnswers:
-        """Return all branches.
+    def all_stored(cls, store: Store, listing: Listing, columns: Sequence[str]) -> StoredAnswers:
+        """Return the branches of a store.
 
         Parameters
         ----------
         store : Store
-        where : sequence of str
-            Must be empty.
+        listing : Listing
+            Fields are those of the scene at the first point and of the branch, such as ``parameter`` or
+            ``folds.0.value``.
+        columns : sequence of str
+            Such fields; if empty, the usual ones.
 
         Returns
         -------
         StoredAnswers
-
-        Raises
-        ------
-        ValueError
-            If there is a condition.
         """
-        from ensemble.display.branch_tables import branches_table
+        from ensemble.store.branch_listing import BRANCH_FIELDS, listed
+        from ensemble.store.columns import ListColumn, columns_of
 
-        if where:
-            raise ValueError(f"where: {where[0]!r} — branches are listed without conditions")
-        summaries = store.branches.summaries()
-        return StoredAnswers([summary.document() for summary in summaries], branches_table(summaries))
+        shown = columns_of(columns, BRANCH_FIELDS) or (
+            ListColumn("branch", itemgetter("key")),
+            ListColumn("parameter", itemgetter("parameter")),
+            ListColumn("from", lambda branch: branch["branch"][0]["parameter"]),
+            ListColumn("points", lambda branch: len(branch["branch"])),
+            ListColumn("folds", lambda branch: [point["value"] for point in branch["folds"]] or None),
+            ListColumn("crossings", lambda branch: [point["value"] for point in branch["crossings"]] or None),
+        )
+        return StoredAnswers(iter(listed(store.branches.summaries(), listing)), shown)

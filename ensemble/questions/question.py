@@ -6,7 +6,7 @@ import hashlib
 import json
 import shlex
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from operator import attrgetter
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
     from ensemble.display.progress import Display
     from ensemble.store import Store
+    from ensemble.store.columns import ListColumn
+    from ensemble.store.listing import Listing
 
 SomeDocument = TypeVar("SomeDocument", bound=Model)
 
@@ -119,14 +121,14 @@ class StoredAnswers:
 
     Attributes
     ----------
-    json_documents : list of dict
-        One for each answer.
-    table : Table
-        One row for each answer.
+    json_documents : iterator of dict
+        One for each answer, as it was recorded.  They are read one after the other.
+    columns : tuple of ListColumn
+        What a table shows of each document.
     """
 
-    json_documents: list[dict[str, Any]]
-    table: Table
+    json_documents: Iterator[dict[str, Any]]
+    columns: tuple[ListColumn, ...]
 
 
 class Question(ABC, Generic[SomeDocument]):
@@ -389,15 +391,17 @@ class Question(ABC, Generic[SomeDocument]):
         return None
 
     @classmethod
-    def all_stored(cls, store: Store, where: Sequence[str]) -> StoredAnswers:
+    def all_stored(cls, store: Store, listing: Listing, columns: Sequence[str]) -> StoredAnswers:
         """Return the answers of this kind that a store has.
 
         Parameters
         ----------
         store : Store
             An open store.
-        where : sequence of str
-            Conditions that they meet, as the store's filters write them.
+        listing : Listing
+            Which answers, and in which order.
+        columns : sequence of str
+            Dotted paths of the fields that a table shows; if empty, those that are usual for this kind.
 
         Returns
         -------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
@@ -21,8 +22,17 @@ if TYPE_CHECKING:
 
     from ensemble.display.progress import Display
     from ensemble.store import Store
+    from ensemble.store.listing import Listing
     from ensemble.store.run_record import RunSummary
 
+_COLUMNS = {
+    "run": "key",
+    "outcome": "outcome",
+    "flow": "flow.kind",
+    "rate": "flow.rate",
+    "hamaker": "adhesion.hamaker",
+    "revision": "results_revision",
+}
 _WORK = ("points", "steps", "rejected_steps", "rhs_evaluations", "wall_seconds")
 _RESULTS = (
     "outcome",
@@ -175,25 +185,30 @@ class SceneQuestion(Question[Scene]):
             return None
 
     @classmethod
-    def all_stored(cls, store: Store, where: Sequence[str]) -> StoredAnswers:
+    def all_stored(cls, store: Store, listing: Listing, columns: Sequence[str]) -> StoredAnswers:
         """See `Question`.
 
         Parameters
         ----------
         store : Store
             An open store.
-        where : sequence of str
-            Conditions on the scene and the results, such as ``flow.rate>=0.5``.
+        listing : Listing
+            Fields are those of the scene and the results, such as ``flow.rate``.
+        columns : sequence of str
+            Such fields.
 
         Returns
         -------
         StoredAnswers
             The runs.
         """
-        from ensemble.display.result_tables import runs_table
+        from ensemble.store.catalog_tables import RUN_FIELDS
+        from ensemble.store.columns import column_of, columns_of
 
-        summaries = store.summaries(where)
-        return StoredAnswers([summary.document() for summary in summaries], runs_table(summaries))
+        shown = columns_of(columns, RUN_FIELDS) or tuple(
+            column_of(path, RUN_FIELDS, heading) for heading, path in _COLUMNS.items()
+        )
+        return StoredAnswers((json.loads(record.json) for record in store.run_records(listing)), shown)
 
 
 def run_document(summary: RunSummary) -> dict[str, Any]:

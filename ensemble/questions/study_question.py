@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from operator import itemgetter
 from pathlib import Path
 from statistics import fmean
 from typing import TYPE_CHECKING, Any
@@ -31,6 +33,8 @@ if TYPE_CHECKING:
     from ensemble.mpi.run_study import Snapshot, StudyResult
     from ensemble.search.boundary import Boundary
     from ensemble.store import Store
+    from ensemble.store.columns import ListColumn
+    from ensemble.store.listing import Listing
 
 _ENDS = 2  # of a bracket, hence limits that are run first, and runs that certify a bracket
 
@@ -196,26 +200,47 @@ class StudyQuestion(Question[Study]):
         return _StoredBoundary(named[0], store) if named else None
 
     @classmethod
-    def all_stored(cls, store: Store, where: Sequence[str]) -> StoredAnswers:
+    def all_stored(cls, store: Store, listing: Listing, columns: Sequence[str]) -> StoredAnswers:
         """See `Question`.
 
         Parameters
         ----------
         store : Store
             An open store.
-        where : sequence of str
-            Conditions, such as ``name=critical-hamaker``.
+        listing : Listing
+            Fields are those of the boundary, such as ``name``.
+        columns : sequence of str
+            Such fields.
 
         Returns
         -------
         StoredAnswers
             The boundaries.
         """
-        from ensemble.display.result_tables import boundaries_table
+        from ensemble.store.catalog_tables import BOUNDARY_FIELDS
+        from ensemble.store.columns import columns_of
 
-        boundaries = store.boundaries(where)
-        documents = [boundary.model_dump(mode="json") for boundary in boundaries]
-        return StoredAnswers(documents, boundaries_table(boundaries))
+        shown = columns_of(columns, BOUNDARY_FIELDS) or _columns()
+        return StoredAnswers((json.loads(record.json) for record in store.boundary_records(listing)), shown)
+
+
+def _columns() -> tuple[ListColumn, ...]:
+    from ensemble.store.columns import ListColumn
+
+    def converged(boundary: Mapping[str, Any]) -> int:
+        return sum(point["status"] == "converged" for point in boundary["points"])
+
+    def certified(boundary: Mapping[str, Any]) -> int:
+        return sum(point["certified"] for point in boundary["points"])
+
+    return (
+        ListColumn("boundary", itemgetter("study_key")),
+        ListColumn("name", itemgetter("name")),
+        ListColumn("points", lambda boundary: len(boundary["points"])),
+        ListColumn("converged", converged),
+        ListColumn("certified", certified),
+        ListColumn("updated", lambda boundary: boundary["updated"][:19].replace("T", " ")),
+    )
 
 
 @dataclass(frozen=True)

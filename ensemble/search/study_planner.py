@@ -10,7 +10,6 @@ from bisect import bisect_left, insort
 from collections.abc import Callable, Iterable
 from heapq import heappop, heappush
 
-from ensemble.config.dotted_paths import parameter_value
 from ensemble.config.study import Study
 from ensemble.search.boundary import Boundary, BoundaryPoint
 from ensemble.search.point_search import SearchRun
@@ -18,7 +17,6 @@ from ensemble.search.study_point import StudyPoint
 from ensemble.search.study_search import expected_bracket
 from ensemble.search.task_queue import RunAnswer
 from ensemble.timestamp import now
-from solver.scene import Scene
 
 _NEIGHBORS = 2  # on either side, from which a bracket is expected
 
@@ -38,18 +36,22 @@ class StudyPlanner:
     known : callable
         Returns the answer of the run with a key if it has been made before, else None.  A run that has been
         made before is never a task.
-    made : iterable of Scene
-        Scenes of runs made before.  Those that belong to this study are answers from the start.
+    made : iterable of (float, float)
+        Values of the two parameters, of the sweep and of the search, at which runs have been made before.
+        Those runs that belong to this study are answers from the start.
     """
 
     def __init__(
-        self, study: Study, known: Callable[[str], RunAnswer | None], made: Iterable[Scene] = ()
+        self,
+        study: Study,
+        known: Callable[[str], RunAnswer | None],
+        made: Iterable[tuple[float, float]] = (),
     ) -> None:
         self._study = study
         self._grid = study.search.grid
         self._indices = self._grid.within(*study.search.limits)
         self._points = {at: StudyPoint(study, at, known) for at in study.sweep.values}
-        for at, value in set(filter(None, map(self._place, made))):
+        for at, value in {place for place in made if self._is_tried(*place)}:
             self._points[at].take_known(value)
         self._order = {at: order for order, at in enumerate(self._points)}
         # Entries of the queue whose number is no longer that of their point are out of date.
@@ -134,15 +136,11 @@ class StudyPlanner:
             updated=now(),
         )
 
-    def _place(self, scene: Scene) -> tuple[float, float] | None:
-        """Return the place in the study of a run of this scene; None if it is not one of the study's."""
+    def _is_tried(self, at: float, value: float) -> bool:
         try:
-            at = parameter_value(scene, self._study.sweep.parameter)
-            value = parameter_value(scene, self._study.search.parameter)
-            is_tried = at in self._points and self._grid.index(value) in self._indices
-        except ValueError:  # a scene of another kind, or a value that is not on the grid
-            return None
-        return (at, value) if is_tried else None
+            return at in self._points and self._grid.index(value) in self._indices
+        except ValueError:  # not on the grid
+            return False
 
     def _look_at(self, at: float, again: bool = True) -> None:
         """Take note of what has become of a point, and enter it in the queue again."""

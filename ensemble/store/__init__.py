@@ -17,13 +17,13 @@ from typing import TYPE_CHECKING, Any
 from ensemble.errors import NotStored, StoreError, StoreInputError
 
 if TYPE_CHECKING:
-    from ensemble.store.catalog import Record
+    from ensemble.store.catalog_tables import Record
     from ensemble.store.staging import RunStaging, Staged
     from ensemble.store.store import Store
 
 __all__ = ["NotStored", "Record", "RunStaging", "Staged", "Store", "StoreError", "StoreInputError"]
 
-_MODULES = {"Record": "catalog", "RunStaging": "staging", "Staged": "staging", "Store": "store"}
+_MODULES = {"Record": "catalog_tables", "RunStaging": "staging", "Staged": "staging", "Store": "store"}
 
 
 def __getattr__(name: str) -> Any:

@@ -54,13 +54,39 @@ class BranchShelf:
         """
         partial = unfinished / f"{summary.key}.branch"
         write_group(partial, summary.model_dump(mode="json"), branch_arrays(branch))
+        self._keep(partial, summary.key)
+
+    def copy(self, key: str, source: BranchShelf, unfinished: Path) -> None:
+        """Copy a branch of another store, unless there is one with its key.
+
+        Parameters
+        ----------
+        key : str
+            Of a branch of the other store.
+        source : BranchShelf
+            The branches of the other store.
+        unfinished : Path
+            See `save`.
+
+        Raises
+        ------
+        StoreError
+            If the branch is damaged.
+        """
+        directory = source._branches / key
+        problems = _problems(directory)
+        if problems:
+            raise StoreError(problems[0])
+        self._keep(shutil.copytree(directory, unfinished / f"{key}.branch"), key)
+
+    def _keep(self, partial: Path, key: str) -> None:
         flush_tree(partial)
         with locked(self._store / STORE_LOCK):
             self._branches.mkdir(exist_ok=True)
-            if self.contains(summary.key):
+            if self.contains(key):
                 shutil.rmtree(partial)
             else:
-                os.rename(partial, self._branches / summary.key)
+                os.rename(partial, self._branches / key)
             flush(self._branches)
 
     def contains(self, key: str) -> bool:

@@ -2,78 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, NamedTuple
+from collections.abc import Iterator, Sequence
 
-from sqlalchemy import JSON, Executable, Text, bindparam, cast, delete, insert, select, tuple_
+from sqlalchemy import Executable, Select, Text, bindparam, cast, delete, func, insert, select, tuple_
 from sqlalchemy.exc import DatabaseError
-from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
+from sqlalchemy.orm import InstrumentedAttribute
 from sqlalchemy.schema import CreateSchema
 
 from ensemble.search.boundary import Boundary
-from ensemble.store.filters import conditions, model_fields
+from ensemble.store.catalog_tables import (
+    BOUNDARY_FIELDS,
+    RUN_FIELDS,
+    BoundaryRow,
+    Record,
+    RunRow,
+    Table,
+)
+from ensemble.store.filters import conditions, order, within
+from ensemble.store.listing import BATCH, Listing, ParameterRange
 from ensemble.store.run_record import RunSummary
 from ensemble.store.sql_database import Place, engine, reading_engine
 from ensemble.timestamp import timestamp_text
-from solver.scene import Scene
-
-# A filter names a field of the scene or a result; both have names of their own.
-RUN_FIELDS = model_fields(Scene, "scene") | {
-    name: field for name, field in model_fields(RunSummary).items() if name != "scene"
-}
-BOUNDARY_FIELDS = model_fields(Boundary)
-
-
-class Table(DeclarativeBase):
-    """Base of the tables.  They are what they have always been: what changes is in the documents."""
-
-    type_annotation_map = {dict[str, Any]: JSON}  # noqa: RUF012
-
-
-class RunRow(Table):
-    """A committed run.
-
-    Attributes
-    ----------
-    key : str
-    created : str
-        Moment as text.
-    document : dict
-        JSON of its summary.
-    """
-
-    __tablename__ = "runs"
-
-    key: Mapped[str] = mapped_column(primary_key=True)
-    created: Mapped[str] = mapped_column(index=True)
-    document: Mapped[dict[str, Any]]
-
-
-class BoundaryRow(Table):
-    """The latest state of a study's boundary."""
-
-    __tablename__ = "boundaries"
-
-    study_key: Mapped[str] = mapped_column(primary_key=True)
-    updated: Mapped[str] = mapped_column(index=True)
-    document: Mapped[dict[str, Any]]
-
-
-class Record(NamedTuple):
-    """A run or a boundary as it was recorded.
-
-    A field that a later version has added to the models is missing in it, and has its default.
-
-    Attributes
-    ----------
-    key : str
-    json : str
-        Of the summary of a run, or of the boundary.
-    """
-
-    key: str
-    json: str
-
 
 # As text, since most of those who ask pass it on.
 _RUN = select(RunRow.key, cast(RunRow.document, Text))
@@ -159,6 +108,16 @@ class Catalog:
         with self._engine.connect() as connection:
             return set(connection.scalars(select(RunRow.key)))
 
+    def require_readable(self) -> None:
+        """Raise a database error unless a run can be looked up."""
+        with self._engine.connect() as connection:
+            connection.execute(select(RunRow.key).limit(1))
+
+    def count_runs(self) -> int:
+        """Return how many runs there are."""
+        with self._engine.connect() as connection:
+            return connection.execute(select(func.count()).select_from(RunRow)).scalar_one()
+
     def keys_from(self, beginning: str, limit: int) -> list[str]:
         """Return keys of runs that begin alike, in ascending order.
 
@@ -191,20 +150,41 @@ class Catalog:
         """
         return self._one(_ONE_RUN, key)
 
-    def runs(self, where: Sequence[str]) -> list[Record]:
-        """Return the runs that meet all filters, oldest first.
+    def runs(self, listing: Listing) -> Iterator[Record]:
+        """Find runs, the newest first unless the listing says otherwise.
 
         Parameters
         ----------
-        where : sequence of str
-            Filters, as `ensemble.store.filters` takes them.
+        listing : Listing
 
         Returns
         -------
-        list of Record
+        iterator of Record
+            Only some of them are in memory at once, and between two of them the database is not locked.
         """
-        query = _RUN.where(*conditions(where, RunRow.document, RUN_FIELDS))
-        return self._all(query.order_by(RunRow.created, RunRow.key))
+        row = RunRow
+        keys = select(row.key).where(*conditions(listing.where, row.document, RUN_FIELDS))
+        if listing.sort == "created":
+            keys = keys.order_by(row.created, row.key)
+        elif listing.sort is not None:
+            keys = keys.order_by(*order(listing.sort, row.document, RUN_FIELDS))
+        return self._batches(keys.order_by(row.created.desc(), row.key.desc()), listing, _RUN, row.key)
+
+    def runs_within(self, ranges: Sequence[ParameterRange]) -> Iterator[Record]:
+        """Find the runs whose scenes have parameters within some ranges.
+
+        Parameters
+        ----------
+        ranges : sequence of ParameterRange
+            All of them must hold the run, but for a rounding error of the database.
+
+        Returns
+        -------
+        iterator of Record
+            See `runs`.
+        """
+        met = [within(each, RunRow.document, RUN_FIELDS) for each in ranges]
+        return self._batches(select(RunRow.key).where(*met), Listing(), _RUN, RunRow.key)
 
     def runs_page(self, where: Sequence[str], after: str | None, limit: int) -> list[Record]:
         """Return a part of the runs that meet all filters, newest first.
@@ -258,20 +238,26 @@ class Catalog:
         """
         return self._one(_ONE_BOUNDARY, study_key)
 
-    def boundaries(self, where: Sequence[str]) -> list[Record]:
-        """Return the boundaries that meet all filters, the longest unchanged first.
+    def boundaries(self, listing: Listing) -> Iterator[Record]:
+        """Find boundaries, the latest change first unless the listing says otherwise.
 
         Parameters
         ----------
-        where : sequence of str
-            Filters, as `ensemble.store.filters` takes them.
+        listing : Listing
 
         Returns
         -------
-        list of Record
+        iterator of Record
+            See `runs`.
         """
-        query = _BOUNDARY.where(*conditions(where, BoundaryRow.document, BOUNDARY_FIELDS))
-        return self._all(query.order_by(BoundaryRow.updated, BoundaryRow.study_key))
+        row = BoundaryRow
+        keys = select(row.study_key).where(*conditions(listing.where, row.document, BOUNDARY_FIELDS))
+        if listing.sort == "updated":
+            keys = keys.order_by(row.updated, row.study_key)
+        elif listing.sort is not None:
+            keys = keys.order_by(*order(listing.sort, row.document, BOUNDARY_FIELDS))
+        newest_first = keys.order_by(row.updated.desc(), row.study_key.desc())
+        return self._batches(newest_first, listing, _BOUNDARY, row.study_key)
 
     def boundaries_page(self, where: Sequence[str], after: str | None, limit: int) -> list[Record]:
         """Return a part of the boundaries that meet all filters, by ascending key.
@@ -303,3 +289,17 @@ class Catalog:
     def _all(self, query: Executable) -> list[Record]:
         with self._engine.connect() as connection:
             return [Record(key, json) for key, json in connection.execute(query)]
+
+    def _batches(
+        self,
+        keys: Select[str],
+        listing: Listing,
+        records: Select[str, str],
+        key: InstrumentedAttribute[str],
+    ) -> Iterator[Record]:
+        with self._engine.connect() as connection:
+            found = [row[0] for row in connection.execute(keys.limit(listing.limit))]
+        for begin in range(0, len(found), BATCH):
+            batch = found[begin : begin + BATCH]
+            there = {record.key: record for record in self._all(records.where(key.in_(batch)))}
+            yield from (there[each] for each in batch if each in there)  # one may be gone by now

@@ -6,23 +6,22 @@ import math
 import operator
 import re
 import reprlib
-import types
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, is_dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import is_dataclass
 from datetime import datetime
-from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
+from typing import Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel, TypeAdapter, ValidationError
-from pydantic.fields import FieldInfo
-from sqlalchemy import ColumnElement, String, case, false
+from sqlalchemy import JSON, Column, ColumnElement, String, and_, case, column, false, func, select
 from sqlalchemy.ext.compiler import compiles
 from sqlalchemy.orm import InstrumentedAttribute
 from sqlalchemy.sql.compiler import SQLCompiler
 from sqlalchemy.sql.functions import GenericFunction
 
 from ensemble.errors import StoreInputError
+from ensemble.store.listing import ParameterRange
+from ensemble.store.record_fields import EACH, Field, Fields, Location, alternatives, field_at
 from ensemble.timestamp import timestamp_text
-from solver.registry import RegisteredNames, Registry
 
 COMPARISONS = {
     "=": operator.eq,
@@ -39,110 +38,10 @@ _SIGN = re.compile(r"<=|>=|!=|=|<|>")
 NUMBERS = ("number", "integer", "real")
 BOOLEANS = ("boolean", "integer")  # SQLite reads true and false as 1 and 0
 
+_ROUNDING = 1e-12
 
-@dataclass(frozen=True)
-class Field:
-    """A field of a record.
-
-    Attributes
-    ----------
-    location : tuple of str or int
-        Keys and indices that lead to it in the JSON document.
-    annotation : any
-        Its type.
-    """
-
-    location: tuple[str | int, ...]
-    annotation: Any
-
-
-Fields = Mapping[str, Field]
-
-
-def model_fields(model: type[BaseModel], *prefix: str) -> dict[str, Field]:
-    """Return the top-level fields of a model.
-
-    Parameters
-    ----------
-    model : type of BaseModel
-    *prefix : str
-        Keys that lead to the JSON of the model in a document.
-
-    Returns
-    -------
-    dict of str to Field
-    """
-    return {name: Field((*prefix, name), _declared_type(info)) for name, info in model.model_fields.items()}
-
-
-def _declared_type(info: FieldInfo) -> Any:
-    """Return the type of a field together with its registry, which pydantic keeps apart from the type."""
-    registries = [each for each in info.metadata if isinstance(each, Registry | RegisteredNames)]
-    return Annotated[info.annotation, registries[0]] if registries else info.annotation
-
-
-def _document_name(name: str, annotation: Any) -> str:
-    """Return the name that a field of a dataclass has in documents."""
-    metadata = get_args(annotation)[1:] if get_origin(annotation) is Annotated else ()
-    return next((each.alias for each in metadata if isinstance(each, FieldInfo) and each.alias), name)
-
-
-def _alternatives(annotation: Any) -> Iterator[Any]:
-    """Yield the types that a value may have: unions are taken apart, registries looked up, None left out."""
-    origin = get_origin(annotation)
-    if origin is Annotated:
-        kind, *metadata = get_args(annotation)
-        match metadata[0]:
-            case Registry() as models:
-                yield from models
-            case RegisteredNames() as names:
-                yield Literal[tuple(names)]
-            case _:
-                yield from _alternatives(kind)
-    elif origin in (Union, types.UnionType):
-        for member in get_args(annotation):
-            yield from _alternatives(member)
-    elif annotation is not types.NoneType:
-        yield annotation
-
-
-def _members(annotation: Any, segment: str) -> Iterator[tuple[str | int, Any]]:
-    """Yield the key in the JSON document, and the type, of what a segment names inside a value."""
-    origin, arguments = get_origin(annotation), get_args(annotation)
-    if origin is dict:
-        yield segment, arguments[1]
-    elif origin in (list, tuple):
-        if segment.isdecimal():
-            repeated = origin is list or arguments[-1] is Ellipsis
-            if repeated or int(segment) < len(arguments):
-                yield int(segment), arguments[0 if repeated else int(segment)]
-    elif is_dataclass(annotation):
-        for name, kind in get_type_hints(annotation, include_extras=True).items():
-            if segment == _document_name(name, kind):
-                yield segment, kind
-    elif isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        if segment in annotation.model_fields:
-            yield segment, _declared_type(annotation.model_fields[segment])
-    elif annotation is Any:
-        yield segment, Any
-
-
-def _resolve(path: str, fields: Fields) -> Field:
-    first, *rest = path.split(".")
-    if first not in fields:
-        raise StoreInputError(f"where: unknown field {path!r}; fields are {', '.join(sorted(fields))}")
-    field = fields[first]
-    for segment in rest:
-        members = [member for kind in _alternatives(field.annotation) for member in _members(kind, segment)]
-        if not members:
-            hint = " (name one by its index, as in vesicles.0)" if _is_sequence(field.annotation) else ""
-            raise StoreInputError(f"where: unknown field {path!r}: there is no {segment!r}{hint}")
-        field = Field((*field.location, members[0][0]), Union[tuple(kind for _, kind in members)])  # noqa: UP007
-    return field
-
-
-def _is_sequence(annotation: Any) -> bool:
-    return any(get_origin(kind) in (list, tuple) for kind in _alternatives(annotation))
+Comparison = Callable[[Any], ColumnElement[bool]]
+JsonColumn = InstrumentedAttribute[Any] | Column[Any]
 
 
 class json_type(GenericFunction[str]):  # noqa: N801  SQLAlchemy takes the name of the function from it
@@ -155,6 +54,23 @@ class json_type(GenericFunction[str]):  # noqa: N801  SQLAlchemy takes the name 
 @compiles(json_type, "postgresql")
 def _json_typeof(function: json_type, compiler: SQLCompiler, **options: Any) -> str:
     return f"json_typeof({compiler.process(function.clauses, **options)})"
+
+
+class json_elements(GenericFunction[Any]):  # noqa: N801  as above
+    """The elements of a JSON array as rows with a column ``value``."""
+
+    type = JSON()
+    inherit_cache = True
+
+
+@compiles(json_elements)
+def _json_each(function: json_elements, compiler: SQLCompiler, **options: Any) -> str:
+    return f"json_each({compiler.process(function.clauses, **options)})"
+
+
+@compiles(json_elements, "postgresql")
+def _json_array_elements(function: json_elements, compiler: SQLCompiler, **options: Any) -> str:
+    return f"json_array_elements({compiler.process(function.clauses, **options)})"
 
 
 def _of_kind(
@@ -208,10 +124,11 @@ def _parts(text: str) -> tuple[str, str, str]:
     )
 
 
-def condition(text: str, document: InstrumentedAttribute[Any], fields: Fields) -> ColumnElement[bool]:
+def condition(text: str, document: JsonColumn, fields: Fields) -> ColumnElement[bool]:
     """Turn a filter into a condition on a JSON column.
 
-    A record without the quantity meets no comparison but ``= null``.
+    A record without the quantity meets no comparison but ``= null``.  A name that is applied to an array must
+    meet it in each of its elements.
 
     Parameters
     ----------
@@ -232,13 +149,31 @@ def condition(text: str, document: InstrumentedAttribute[Any], fields: Fields) -
         If the filter is malformed, the field is unknown, or the value does not have its type.
     """
     path, sign, value = _parts(text)
-    field = _resolve(path, fields)
-    element, compare = document[field.location], COMPARISONS[sign]
-    if value == "null" and sign in EQUALITIES:
-        stored = element.as_string()
-        return stored.is_(None) if sign == "=" else stored.is_not(None)
+    field = field_at(path, fields, "where")
+    return _in_each(document, field.location, _comparison(path, sign, value, field))
 
-    kinds = set(_alternatives(field.annotation))
+
+def _in_each(document: Any, location: Location, met: Comparison) -> ColumnElement[bool]:
+    """Demand that what is at a location meets a comparison, or that it does in each element of an array."""
+    if EACH not in location:
+        return met(document[location])
+    place = location.index(EACH)
+    elements = json_elements(document[location[:place]]).table_valued(column("value", JSON))
+    inner = _in_each(elements.c.value, location[place + 1 :], met)
+    unmet = select(1).select_from(elements).where(~func.coalesce(inner, false()))
+    return and_(select(1).select_from(elements).exists(), ~unmet.exists())
+
+
+def _comparison(path: str, sign: str, value: str, field: Field) -> Comparison:
+    """Return what compares an element of a document with the value of a filter."""
+    compare = COMPARISONS[sign]
+    if value == "null":
+        if sign == "=":
+            return lambda element: element.as_string().is_(None)
+        if sign == "!=":
+            return lambda element: element.as_string().is_not(None)
+
+    kinds = set(alternatives(field.annotation))
     if kinds == {Any}:
         kinds = {_apparent_type(value)}
     if any(_is_group(kind) for kind in kinds):
@@ -250,19 +185,20 @@ def condition(text: str, document: InstrumentedAttribute[Any], fields: Fields) -
         if not math.isfinite(float(value)):
             raise StoreInputError(f"where: {value!r} is no value of {path}: it must be finite")
         # Compared as documents are, in double precision: SQL has no integers as long as Python's.
-        return _of_kind(element, NUMBERS, compare(element.as_float(), float(value)))
+        return lambda element: _of_kind(element, NUMBERS, compare(element.as_float(), float(value)))
     if kinds == {datetime}:
-        return compare(element.as_string(), timestamp_text(_parse(value, path, datetime)))
+        moment = timestamp_text(_parse(value, path, datetime))
+        return lambda element: compare(element.as_string(), moment)
     if sign not in EQUALITIES:
         raise StoreInputError(f"where: {path} is not a number and compares by = or != only")
     if kinds == {bool}:
-        return _of_kind(element, BOOLEANS, compare(element.as_boolean(), _parse(value, path, bool)))
-    return compare(element.as_string(), str(_parse(value, path, _joined(kinds))))
+        flag = _parse(value, path, bool)
+        return lambda element: _of_kind(element, BOOLEANS, compare(element.as_boolean(), flag))
+    word = str(_parse(value, path, _joined(kinds)))
+    return lambda element: compare(element.as_string(), word)
 
 
-def conditions(
-    where: Sequence[str], document: InstrumentedAttribute[Any], fields: Fields
-) -> list[ColumnElement[bool]]:
+def conditions(where: Sequence[str], document: JsonColumn, fields: Fields) -> list[ColumnElement[bool]]:
     """Turn several filters, all of which a record must meet, into conditions on a JSON column.
 
     Parameters
@@ -279,3 +215,66 @@ def conditions(
     list of ColumnElement of bool
     """
     return [condition(text, document, fields) for text in where]
+
+
+def within(values: ParameterRange, document: JsonColumn, fields: Fields) -> ColumnElement[bool]:
+    """Turn a range of a number into a condition on a JSON column.
+
+    Parameters
+    ----------
+    values : ParameterRange
+    document : column
+        JSON of the records.
+    fields : mapping of str to Field
+        The fields with which a path may begin.
+
+    Returns
+    -------
+    ColumnElement of bool
+        It also holds for values beyond the range by a rounding error: a database may read a number off by one
+        bit.
+    """
+    path, low, high = values
+    low, high = low - _ROUNDING * abs(low), high + _ROUNDING * abs(high)
+    location = field_at(path, fields, "where").location
+    return _in_each(
+        document, location, lambda element: _of_kind(element, NUMBERS, element.as_float().between(low, high))
+    )
+
+
+def order(text: str, document: JsonColumn, fields: Fields) -> list[ColumnElement[Any]]:
+    """Turn a field into what sorts records by it; those without the quantity come last.
+
+    Parameters
+    ----------
+    text : str
+        Dotted path; with ``-`` before it, the largest value comes first.
+    document : column
+        JSON of the records.
+    fields : mapping of str to Field
+        The fields with which a path may begin.
+
+    Returns
+    -------
+    list of ColumnElement
+        For ``ORDER BY``.
+
+    Raises
+    ------
+    StoreInputError
+        If the field is unknown, or holds other fields.
+    """
+    path = text.removeprefix("-")
+    field = field_at(path, fields, "sort")
+    kinds = set(alternatives(field.annotation))
+    if any(_is_group(kind) for kind in kinds):
+        raise StoreInputError(f"sort: {path} is a group of fields; name one of them")
+    element = document[tuple(0 if part == EACH else part for part in field.location)]
+    number = case((json_type(element).in_(NUMBERS), element.as_float()), else_=None)
+    keys = [number] if kinds & {float, int, Any} else []
+    keys += [element.as_string()] if kinds - {float, int} else []
+    return [
+        ordering
+        for key in keys
+        for ordering in (key.is_(None), key.desc() if text.startswith("-") else key.asc())
+    ]

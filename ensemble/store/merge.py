@@ -1,22 +1,24 @@
-"""Runs and boundaries of one store, copied into another."""
+"""Runs, branches and boundaries of one store, copied into another."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
+from ensemble.store.listing import Listing
 from ensemble.store.store import Store
 
 
 class Merged(NamedTuple):
-    """How many runs and boundaries were copied, and how many of the runs were there already."""
+    """How many runs, boundaries and branches were copied, and how many of the runs were there already."""
 
     runs: int
     boundaries: int
+    branches: int
     known_runs: int
 
 
 def merge(source: Store, target: Store) -> Merged:
-    """Copy all runs and boundaries of one store into another; of a boundary in both, the newer one stays.
+    """Copy all that one store has into another; of a boundary in both, the newer one stays.
 
     Parameters
     ----------
@@ -33,19 +35,31 @@ def merge(source: Store, target: Store) -> Merged:
     Raises
     ------
     StoreError
-        If a run of the source is damaged.  All runs before it are copied.
+        If a run or a branch of the source is damaged.  Everything before it is copied.
     """
-    runs = known = boundaries = 0
-    for summary in source.summaries():
-        if target.contains(summary.key):
+    runs = known = 0
+    for record in source.run_records(Listing(sort="created")):
+        if target.contains(record.key):
             known += 1
             continue
-        target.save(source.load(summary.key), summary)
+        target.save(source.load(record.key), source.summary(record.key))
         runs += 1
+    return Merged(runs, _merge_boundaries(source, target), _merge_branches(source, target), known)
+
+
+def _merge_boundaries(source: Store, target: Store) -> int:
+    copied = 0
     there = {boundary.study_key: boundary for boundary in target.boundaries()}
     for boundary in source.boundaries():
         other = there.get(boundary.study_key)
         if other is None or other.updated < boundary.updated:
             target.save_boundary(boundary)
-            boundaries += 1
-    return Merged(runs, boundaries, known)
+            copied += 1
+    return copied
+
+
+def _merge_branches(source: Store, target: Store) -> int:
+    missing = [key for key in source.branches.keys() if not target.branches.contains(key)]  # noqa: SIM118
+    for key in missing:
+        target.copy_branch(key, source)
+    return len(missing)

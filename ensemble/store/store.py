@@ -6,35 +6,39 @@ and most users of a store need only its catalog.
 
 from __future__ import annotations
 
-import errno
 import json
 import logging
 import os
 import shutil
 from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager, closing, contextmanager
+from contextlib import AbstractContextManager, suppress
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Self, TypeVar
+from typing import TYPE_CHECKING, Self
 
-from pydantic import ValidationError
 from sqlalchemy.exc import DatabaseError
 
-from ensemble.disk import flush, locked, require_space
-from ensemble.errors import FULL, NotStored, OtherVersionError, StoreError, StoreInputError
+from ensemble.config.dotted_paths import number_at
+from ensemble.disk import flush, locked
+from ensemble.errors import NotStored, OtherVersionError, StoreError, StoreInputError
 from ensemble.search.boundary import Boundary
 from ensemble.search.task_queue import RunAnswer
-from ensemble.store.catalog import Catalog, Record
+from ensemble.store.catalog import Catalog
+from ensemble.store.catalog_tables import Record
+from ensemble.store.listing import Listing, ParameterRange
+from ensemble.store.reading import readable, validated
 from ensemble.store.recovery import Recovery
-from ensemble.store.run_record import RunSummary, first_problem
-from ensemble.store.sql_database import CATALOG, PLACE, UNUSABLE, Place, is_file, reason
+from ensemble.store.run_record import RunSummary
+from ensemble.store.sql_database import UNUSABLE, Place, reason
 from ensemble.store.staging import RUNS, STAGING, STORE_LOCK, RunStaging, Staged, patiently
+from ensemble.store.store_directory import create, exists, refused, require_catalog, require_writable
 from solver.analysis.run import Outcome, Run
 
 if TYPE_CHECKING:
     from ensemble.search.branch_summary import BranchSummary
     from ensemble.store.archive import StoredArrays
     from ensemble.store.branch_shelf import BranchShelf
+    from ensemble.store.verification import OnProgress
     from solver.simulation.steady_scenes import SteadyBranch
 
 _CANDIDATES = 5  # keys that a message about an ambiguous one names
@@ -85,11 +89,11 @@ class Store(AbstractContextManager["Store"]):
             If the path is a file, a directory with other contents, or cannot be created or written to, or if
             the database cannot be used.
         """
-        if not _exists(path):
-            _create(path)
-        with _refused(path):
-            _require_writable(path)
-            _require_catalog(path)
+        if not exists(path):
+            create(path)
+        with refused(path):
+            require_writable(path)
+            require_catalog(path)
             (path / STAGING).mkdir(exist_ok=True)  # a copy may lack it
             store = cls(path)
             store._catalog.require_writable()
@@ -115,12 +119,12 @@ class Store(AbstractContextManager["Store"]):
         StoreInputError
             If there is no store at the path, or the database cannot be used.
         """
-        if not _exists(path):
+        if not exists(path):
             raise StoreInputError(f"store: there is no store at {path}")
-        with _refused(path):
-            _require_catalog(path)
+        with refused(path):
+            require_catalog(path)
             store = cls(path, read_only=True)
-            store._catalog.keys()
+            store._catalog.require_readable()
         return store
 
     def require_usable(self) -> None:
@@ -133,8 +137,8 @@ class Store(AbstractContextManager["Store"]):
         sqlalchemy.exc.SQLAlchemyError
             If the catalog does not answer.
         """
-        _require_writable(self.path)
-        _require_catalog(self.path)
+        require_writable(self.path)
+        require_catalog(self.path)
         self._catalog.boundaries_page((), None, 1)
 
     def close(self) -> None:
@@ -235,70 +239,6 @@ class Store(AbstractContextManager["Store"]):
         with locked(self._lock):
             return self._recovery.recover()
 
-    @classmethod
-    def repair(cls, path: Path) -> list[str]:
-        """Rebuild a lost or damaged catalog from the runs, adopt whole runs and set damaged ones aside.
-
-        Nothing is deleted: what cannot be used is moved to `lost+found/`.  Boundaries are only in the
-        catalog; the studies that traced them trace them again without a simulation.
-
-        Parameters
-        ----------
-        path : Path
-            The directory.
-
-        Returns
-        -------
-        list of str
-            What was done, one clause each.
-
-        Raises
-        ------
-        StoreInputError
-            If there is no store at the path, or it cannot be written to.
-        """
-        from ensemble.store.check import check_run
-
-        if not (path / RUNS).is_dir():
-            raise StoreInputError(f"store: there is no store at {path}")
-        done = []
-        with _refused(path):
-            _require_writable(path)
-            (path / STAGING).mkdir(exist_ok=True)
-            if is_file(Place.of(path).url) and not _is_usable(path):
-                done += cls._new_catalog(path)
-            store = cls(path)
-        with store, _refused(path):
-            done += store.recover()
-            for record in store._catalog.runs(()):
-                try:
-                    summary = _validated(RunSummary, "run", record)
-                except OtherVersionError as error:
-                    done.append(f"{error}; left as it is")
-                    continue
-                problems = check_run(store._runs / summary.key, summary)
-                if problems:
-                    with locked(store._lock):
-                        store._set_aside(summary.key)
-                    done.append(f"{problems[0]}; set aside, so that it can be made again")
-        return done
-
-    @staticmethod
-    def _new_catalog(path: Path) -> list[str]:
-        """Put an empty catalog in the place of one that is lost or damaged, which is kept."""
-        done = []
-        with locked(path / STORE_LOCK):
-            catalog = Catalog(Place.of(path))
-            recovery = Recovery(path, catalog)
-            for suffix in ("", "-wal", "-shm", "-journal"):
-                file = path / f"{CATALOG}{suffix}"
-                if file.exists():
-                    done.append(f"{file.name} is damaged; moved to {recovery.set_aside(file)}")
-            (path / CATALOG).touch()
-            with closing(catalog):
-                catalog.create()
-        return [*done, f"{CATALOG} is made again"]
-
     def set_aside(self, key: str) -> Path:
         """Take a run out of the store, so that it can be made again, and keep its files.
 
@@ -328,6 +268,10 @@ class Store(AbstractContextManager["Store"]):
         )
         self._catalog.remove(key)
         return place
+
+    def count_runs(self) -> int:
+        """Return how many runs are committed."""
+        return self._catalog.count_runs()
 
     def contains(self, key: str) -> bool:
         """Tell whether a run is committed.
@@ -403,7 +347,7 @@ class Store(AbstractContextManager["Store"]):
         NotStored
             If there is no such run.
         """
-        return _validated(RunSummary, "run", self.run_record(key))
+        return validated(RunSummary, "run", self.run_record(key))
 
     def run_record(self, key: str) -> Record:
         """Return the summary of a committed run as it was recorded.
@@ -489,7 +433,48 @@ class Store(AbstractContextManager["Store"]):
         StoreInputError
             If a filter is malformed, its field is unknown, or the value does not have its type.
         """
-        return _readable(RunSummary, "run", self._catalog.runs(where))
+        listing = Listing(tuple(where), sort="created")
+        return list(readable(RunSummary, "run", self._catalog.runs(listing)))
+
+    def parameters_within(self, *ranges: ParameterRange) -> Iterator[tuple[float, ...]]:
+        """Find the numbers that runs have as some parameters of their scenes.
+
+        The database compares, so that the documents of other runs are not read.
+
+        Parameters
+        ----------
+        *ranges : ParameterRange
+            The parameters, and which of their values count.
+
+        Yields
+        ------
+        tuple of float
+            For each run that has all of these parameters: their values, to the last bit.
+        """
+        for record in self._catalog.runs_within(ranges):
+            scene = json.loads(record.json)["scene"]
+            with suppress(ValueError):  # different numbers where the path names several places
+                yield tuple(number_at(scene, each.path) for each in ranges)
+
+    def run_records(self, listing: Listing) -> Iterator[Record]:
+        """Find runs, the newest first unless the listing says otherwise.
+
+        Parameters
+        ----------
+        listing : Listing
+            Filters are those of `summaries`.
+
+        Returns
+        -------
+        iterator of Record
+            As it was recorded.
+
+        Raises
+        ------
+        StoreInputError
+            If a filter or the field to sort by is wrong.
+        """
+        return self._catalog.runs(listing)
 
     def runs_page(
         self, where: Sequence[str] = (), after: str | None = None, limit: int = 100
@@ -561,7 +546,28 @@ class Store(AbstractContextManager["Store"]):
         StoreInputError
             If a filter is malformed, its field is unknown, or the value does not have its type.
         """
-        return _readable(Boundary, "boundary", self._catalog.boundaries(where))
+        listing = Listing(tuple(where), sort="updated")
+        return list(readable(Boundary, "boundary", self._catalog.boundaries(listing)))
+
+    def boundary_records(self, listing: Listing) -> Iterator[Record]:
+        """Find boundaries, the latest change first unless the listing says otherwise.
+
+        Parameters
+        ----------
+        listing : Listing
+            Filters are those of `boundaries`.
+
+        Returns
+        -------
+        iterator of Record
+            As it was recorded.
+
+        Raises
+        ------
+        StoreInputError
+            If a filter or the field to sort by is wrong.
+        """
+        return self._catalog.boundaries(listing)
 
     def boundary(self, study_key: str) -> Boundary:
         """Return the boundary of a study.
@@ -579,7 +585,7 @@ class Store(AbstractContextManager["Store"]):
         NotStored
             If there is no such boundary.
         """
-        return _validated(Boundary, "boundary", self.boundary_record(study_key))
+        return validated(Boundary, "boundary", self.boundary_record(study_key))
 
     def boundary_record(self, study_key: str) -> Record:
         """Return the boundary of a study as it was recorded.
@@ -637,6 +643,22 @@ class Store(AbstractContextManager["Store"]):
         """
         self.branches.save(summary, branch, self._staging.directory())
 
+    def copy_branch(self, key: str, source: Store) -> None:
+        """Copy a branch of steady states from another store, unless this one has it.
+
+        Parameters
+        ----------
+        key : str
+            Of a branch of the other store.
+        source : Store
+
+        Raises
+        ------
+        StoreError
+            If the branch is damaged.
+        """
+        self.branches.copy(key, source.branches, self._staging.directory())
+
     @cached_property
     def branches(self) -> BranchShelf:
         """The branches of steady states."""
@@ -644,136 +666,55 @@ class Store(AbstractContextManager["Store"]):
 
         return BranchShelf(self.path)
 
-    def check(self) -> list[str]:
+    def check(self, on_progress: OnProgress | None = None, processes: int = 1) -> list[str]:
         """Verify every run, boundary and branch, and that directory and catalog name the same runs.
+
+        Parameters
+        ----------
+        on_progress : callable, optional
+            Takes the number of runs that are verified and the number of all.
+        processes : int
+            How many verify runs at once.
 
         Returns
         -------
         list of str
             Problems, one sentence each; empty if the store is whole.
         """
-        from ensemble.store.check import check_run
+        from ensemble.store.verification import CheckNotes, run_problems
 
         problems = []
         try:
             different = self._recovery.differences()
-            runs, boundaries = self._catalog.runs(()), self._catalog.boundaries(())
+            total = self._catalog.count_runs()
+            boundaries = self._catalog.boundaries(Listing(sort="updated"))
         except DatabaseError as error:
             return [f"the catalog cannot be read ({reason(error)})"]
         for record in boundaries:
-            problems += _unreadable(Boundary, "boundary", record)
-        for record in runs:
-            directory = self._runs / record.key
-            unreadable = _unreadable(RunSummary, "run", record)
-            problems += unreadable
-            if directory.is_dir() and not unreadable:
-                problems += check_run(directory, _validated(RunSummary, "run", record))
+            problems += _unreadable(record)
+        notes = CheckNotes(self.path)
+        unverified = (
+            record for record in self._catalog.runs(Listing(sort="created")) if record.key not in notes.whole
+        )
+        found = run_problems(self.path, unverified, processes)
+        try:
+            for verified, (key, wrong) in enumerate(found, start=len(notes.whole) + 1):
+                problems += wrong
+                if not wrong:
+                    notes.add(key)
+                if on_progress is not None:
+                    on_progress(verified, total)
+        except BaseException:
+            notes.write()
+            raise
+        notes.remove()
         return [*different, *problems, *self.branches.problems()]
 
 
-def _exists(path: Path) -> bool:
-    # An empty `staging` may be missing from a copy.
-    return (path / RUNS).is_dir() and any((path / name).exists() for name in (STAGING, CATALOG, PLACE))
-
-
-def _create(path: Path) -> None:
-    if path.exists() and not path.is_dir():
-        raise StoreInputError(f"store: {path} is a file; give a directory")
-    with _refused(path):
-        path.mkdir(parents=True, exist_ok=True)
-        # Hidden files (of a desktop, say) do no harm.
-        foreign = {entry.name for entry in path.iterdir() if not entry.name.startswith(".")} - {STORE_LOCK}
-        if foreign and not foreign & {CATALOG, PLACE}:
-            raise StoreInputError(
-                f"store: {path} is not a store and already holds {min(foreign)}; give a new directory"
-            )
-        with locked(path / STORE_LOCK):
-            place = Place.choose(path)
-            if is_file(place.url):
-                (path / CATALOG).touch()  # SQLite itself would not honor the umask
-            with closing(Catalog(place)) as catalog:
-                catalog.create()
-            place.keep(path)
-            for directory in (RUNS, STAGING):
-                (path / directory).mkdir(exist_ok=True)
-            flush(path)
-
-
-def _require_writable(path: Path) -> None:
-    """Raise an error unless runs could be written, before any is computed."""
-    for directory in (path, path / RUNS, path / STAGING):
-        if directory.exists() and not os.access(directory, os.W_OK | os.X_OK):
-            raise PermissionError(errno.EACCES, f"no permission to write to {directory}")
-    require_space(path)
-
-
-def _require_catalog(path: Path) -> None:
-    """Raise an error where the file of the catalog is missing, before a new one is made in its place."""
-    if is_file(Place.of(path).url) and not (path / CATALOG).exists():
-        raise FileNotFoundError(errno.ENOENT, f"{CATALOG} is missing")
-
-
-def _is_usable(path: Path) -> bool:
-    """Tell whether the catalog in a file is there and whole."""
+def _unreadable(record: Record) -> list[str]:
+    """Say what keeps this version from reading a boundary; empty if nothing does."""
     try:
-        _require_catalog(path)
-        with closing(Catalog(Place.of(path))) as catalog:
-            catalog.require_whole()
-    except (OSError, DatabaseError):
-        return False
-    return True
-
-
-@contextmanager
-def _refused(path: Path) -> Iterator[None]:
-    """Say why a store cannot be opened."""
-    try:
-        yield
-    except (OSError, *UNUSABLE) as error:
-        text = getattr(error, "strerror", None) or reason(error)
-        if getattr(error, "errno", None) in FULL:  # nothing is wrong with what was asked
-            raise StoreError(f"store: {path} cannot be written to ({text})") from error
-        lost = isinstance(error, FileNotFoundError | DatabaseError) and _exists(path)
-        hint = (
-            f"; `ensemble check --repair --store {path}` rebuilds a lost or damaged catalog" if lost else ""
-        )
-        raise StoreInputError(f"store: {path} cannot be opened ({text}){hint}") from error
-
-
-AnyDocument = TypeVar("AnyDocument", RunSummary, Boundary)
-
-
-def _validated(model: type[AnyDocument], kind: str, record: Record) -> AnyDocument:
-    """Read a record of the catalog.
-
-    Raises
-    ------
-    OtherVersionError
-        If this version cannot.
-    """
-    try:
-        return model.model_validate_json(record.json)
-    except ValidationError as error:
-        raise OtherVersionError(
-            f"{kind} {record.key}: this version cannot read its record ({first_problem(error)})"
-        ) from error
-
-
-def _unreadable(model: type[AnyDocument], kind: str, record: Record) -> list[str]:
-    """Say what keeps this version from reading a record; empty if nothing does."""
-    try:
-        _validated(model, kind, record)
+        validated(Boundary, "boundary", record)
     except OtherVersionError as error:
         return [str(error)]
     return []
-
-
-def _readable(model: type[AnyDocument], kind: str, records: Sequence[Record]) -> list[AnyDocument]:
-    """Read records, leaving out those that this version cannot read, with a warning that names each."""
-    documents = []
-    for record in records:
-        try:
-            documents.append(_validated(model, kind, record))
-        except OtherVersionError as error:
-            _log.warning("store: %s; left out", error)
-    return documents

@@ -14,6 +14,8 @@ import pytest
 from ensemble.config.run_key import run_key
 from ensemble.search.boundary import Boundary, BoundaryPoint
 from ensemble.store import NotStored, Store, StoreInputError
+from ensemble.store.listing import Listing
+from ensemble.store.run_record import RunSummary
 from solver.analysis.run import Outcome
 from solver.scene import Numerics
 from tests.ensemble.runs import failed_run, quiescent_scene, shear_run, shear_scene
@@ -95,6 +97,11 @@ class CatalogConformance:
             (["start.relaxed=true"], set()),
             (["vesicles.0.center.0<-1"], set(RATES)),
             (["vesicles.0.reduced_area=1"], {None}),
+            (["vesicles.reduced_area=0.9"], set(RATES)),
+            (["vesicles.reduced_area=1"], {None}),
+            (["vesicles.center.0<0"], set()),
+            (["vesicles.center.0<=1.5", "vesicles.viscosity_contrast=1"], {*RATES, None}),
+            (["vesicles.angle!=null"], {*RATES, None}),
             (["viscosity.total>-1"], set(RATES)),
             (["work.steps>=400", "flow=null"], {None}),
             (["created>2000-01-01"], {*RATES, None}),
@@ -118,7 +125,7 @@ class CatalogConformance:
             ("rate=1", "unknown field 'rate'"),
             ("scene.flow.rate=1", "unknown field 'scene.flow.rate'"),
             ("horizon.seconds=1", "'horizon.seconds'"),
-            ("vesicles.reduced_area=1", "vesicles.0"),
+            ("vesicles.reduced=1", "unknown field 'vesicles.reduced'"),
             ("vesicles.0.center.2=1", "'vesicles.0.center.2'"),
             ("flow.rate=fast", "'fast' is no value of flow.rate"),
             ("numerics.points>1.5", "'1.5' is no value of numerics.points"),
@@ -136,6 +143,34 @@ class CatalogConformance:
     def test_wrong_filter_is_named(self, filled: Store, where: str, message: str) -> None:
         with pytest.raises(ValueError, match=f"^where: .*{message}"):
             filled.summaries([where])
+
+    @pytest.mark.parametrize(
+        ("sort", "rates"),
+        [
+            ("flow.rate", [*sorted(RATES), None]),
+            ("-flow.rate", [*sorted(RATES, reverse=True), None]),
+            ("-outcome", [0.5, None, RATES[2], 1.0, 0.25]),  # equal ones come newest first
+            ("period", [1.0, 0.5, RATES[2], 0.25, None]),
+            ("vesicles.reduced_area", [*RATES[::-1], None]),
+            ("created", [*RATES, None]),
+            (None, [None, *RATES[::-1]]),
+        ],
+    )
+    def test_order(self, filled: Store, sort: str | None, rates: list[float | None]) -> None:
+        def listed(limit: int | None) -> list[float | None]:
+            found = map(
+                RunSummary.model_validate_json,
+                (record.json for record in filled.run_records(Listing(sort=sort, limit=limit))),
+            )
+            return [None if summary.scene.flow is None else summary.scene.flow.rate for summary in found]
+
+        assert listed(None) == rates
+        assert listed(2) == rates[:2]
+
+    @pytest.mark.parametrize("sort", ["flow", "flow.rat", "vesicles", "vesicles.center", "", "--flow.rate"])
+    def test_what_cannot_be_sorted_by_is_named(self, filled: Store, sort: str) -> None:
+        with pytest.raises(StoreInputError, match=r"^sort: "):
+            filled.run_records(Listing(sort=sort))
 
     def test_boundary_is_replaced_at_once_and_seen_by_others(self, store: Store) -> None:
         with Store.existing(store.path) as observer:

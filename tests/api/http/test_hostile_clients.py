@@ -14,7 +14,7 @@ from sqlalchemy import Engine, event
 from api.auth import TokenScope
 from api.http.middleware import SECURITY_HEADERS
 from ensemble.errors import StoreInputError
-from ensemble.store.catalog import RUN_FIELDS, RunRow
+from ensemble.store.catalog_tables import RUN_FIELDS, RunRow
 from ensemble.store.filters import condition
 from tests.api.servers import client_of, make_token
 

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from ensemble.store.catalog import BOUNDARY_FIELDS, RUN_FIELDS
+from ensemble.store.catalog_tables import BOUNDARY_FIELDS, RUN_FIELDS
 from tests.api.generated_requests import send_generated_requests
 
 SERVER_ERROR = 500  # this or a higher status would be an error of the service

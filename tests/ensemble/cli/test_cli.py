@@ -324,6 +324,23 @@ def test_query_finds_what_meets_the_conditions(ensemble, finished_study):
     assert "no_such_field" in refused.stderr
 
 
+def test_query_sorts_limits_and_shows_the_columns_that_are_asked_for(ensemble, finished_study):
+    """Takes 5 s."""
+    store = f"--store={finished_study.store}"
+    shown = "--columns=adhesion.hamaker,vesicles.reduced_area"
+    found = ensemble("query", "runs", store, "--sort=-adhesion.hamaker", "--limit=2", shown, "--columns=key")
+    heading, *rows = (line.split("\t") for line in found.stdout.splitlines())
+    assert heading == ["adhesion.hamaker", "vesicles.reduced_area", "key"]
+    every = json.loads(ensemble("query", "runs", store, "--json", "--limit=0").stdout)
+    strongest = sorted((run["scene"]["adhesion"]["hamaker"] for run in every), reverse=True)[:2]
+    assert [row[:2] for row in rows] == [[f"{hamaker:.6g}", "0.9"] for hamaker in strongest]
+    assert "more than 2; --limit 0" in found.stderr
+    for option in ("--columns=flow.rat", "--sort=flow.rat"):
+        refused = ensemble("query", "runs", store, option)
+        assert refused.returncode == 2
+        assert "flow.rat" in refused.stderr
+
+
 def test_tables_are_for_people(ensemble, finished_study, stored_run):
     store = f"--store={finished_study.store}"
     runs = ensemble("query", "runs", store).stdout

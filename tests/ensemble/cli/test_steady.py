@@ -77,12 +77,24 @@ def test_a_stored_branch_is_shown_listed_checked_and_drawn(ensemble, followed, t
     store, document = followed
     key, place = document["key"], f"--store={store}"
     assert json.loads(ensemble("query", "branches", place, "--json").stdout)[0]["folds"] == document["folds"]
+    for condition, found in (
+        ("flow.rate>0", 1),
+        ("folds.value<0", 0),
+        (f"parameter={document['parameter']}", 1),
+    ):
+        listed = ensemble("query", "branches", place, f"--where={condition}", "--columns=key,folds.0.value")
+        assert len(listed.stdout.splitlines()) == 1 + found
     assert "fold" in ensemble("show", key, place).stdout
     file = tmp_path / "diagram.svg"
     assert ensemble("show", key[:8], place, f"--output={file}").returncode == 0
     assert file.stat().st_size > 1000
     with Store.existing(store) as opened:
         assert opened.check() == []
+    merged = ensemble("merge", str(store), f"--into={tmp_path / 'merged'}", "--json")
+    assert json.loads(merged.stdout)["branches"] == 1
+    with Store.existing(store) as source, Store.existing(tmp_path / "merged") as target:
+        assert target.check() == []
+        assert target.branches.summaries() == source.branches.summaries()
     archive = ZipStore(store / "branches" / key / "zarr.zip", mode="r")
     arrays = xarray.open_zarr(archive, consolidated=False).load()
     assert arrays["tangent_angle"].dims == ("parameter", "vesicle", "point")

@@ -54,6 +54,10 @@ def unknown(_: str) -> None:
     return None
 
 
+def places(tasks: list[SearchRun]) -> list[tuple[float, float]]:
+    return [(task.sweep_value, task.value) for task in tasks]
+
+
 def uncertified_study(sweep_values: str, *changes: str) -> Study:
     sweep = (f"sweep.values={sweep_values}", "search.tolerance=0.05")
     return load_study("critical-hamaker", (*sweep, *changes))
@@ -120,7 +124,7 @@ def test_what_is_known_is_never_run_again_and_changes_nothing(
     first = StudyPlanner(study, unknown)
     made = run_study(first, physics, 3, lambda out: out - 1)
     known = {task.key: RunAnswer(physics(task)) for index, task in enumerate(made) if index in kept}
-    resumed = StudyPlanner(study, known.get, [task.scene for task in made])
+    resumed = StudyPlanner(study, known.get, places(made))
     again = run_study(resumed, physics, 2)
     assert answers(resumed.boundary().points) == answers(first.boundary().points)
     assert not {task.key for task in again} & known.keys()
@@ -135,13 +139,13 @@ def test_asked_for_later_a_certification_adds_only_its_own_runs(study: Study) ->
     assert {(point.certified, point.certified_by) for point in plain.boundary().points} == {(False, None)}
 
     known = {task.key: RunAnswer(physics(task)) for task in searched}
-    certified = StudyPlanner(study, known.get, [task.scene for task in searched])
+    certified = StudyPlanner(study, known.get, places(searched))
     added = run_study(certified, physics, 2)
     assert added
     assert all(is_finer(task) for task in added)
 
     known |= {task.key: RunAnswer(physics(task)) for task in added}
-    again = StudyPlanner(study, known.get, [task.scene for task in (*searched, *added)])
+    again = StudyPlanner(study, known.get, places([*searched, *added]))
     assert again.done
     assert again.next_task() is None
     assert again.known_answers == len(searched) + len(added)

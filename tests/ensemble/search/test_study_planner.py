@@ -92,7 +92,7 @@ def test_what_is_known_is_never_run_again_and_changes_nothing(study: Study, kept
     first = StudyPlanner(study, unknown)
     made = run_study(first, 3, lambda out: out - 1)
     known = {task.key: RunAnswer(outcome_of(task)) for index, task in enumerate(made) if index in kept}
-    resumed = StudyPlanner(study, known.get, [task.scene for task in made])
+    resumed = StudyPlanner(study, known.get, [(task.sweep_value, task.value) for task in made])
     assert resumed.known_answers == len(known)
     again = run_study(resumed, 2, lambda out: 0)
     assert brackets(resumed) == brackets(first)
@@ -103,7 +103,7 @@ def test_a_study_with_every_answer_has_no_task(study: Study) -> None:
     first = StudyPlanner(study, unknown)
     made = run_study(first, 2, lambda out: 0)
     known = {task.key: RunAnswer(outcome_of(task)) for task in made}
-    again = StudyPlanner(study, known.get, [task.scene for task in made])
+    again = StudyPlanner(study, known.get, [(task.sweep_value, task.value) for task in made])
     assert again.done
     assert again.next_task() is None
     assert [point.runs for point in again.boundary().points] == [
@@ -114,10 +114,10 @@ def test_a_study_with_every_answer_has_no_task(study: Study) -> None:
 def test_runs_of_other_scenes_are_no_answers(study: Study) -> None:
     task = StudyPlanner(study, unknown).next_task()
     assert task is not None
-    finer = task.scene.model_copy(update={"numerics": task.scene.numerics.model_copy(update={"points": 128})})
+    place = (task.sweep_value, task.value)
     known = {task.key: RunAnswer(Outcome.BOUND)}
-    assert StudyPlanner(study, known.get, [finer]).known_answers == 1, "same place, found by the key"
-    assert StudyPlanner(study, {"another": RunAnswer(Outcome.BOUND)}.get, [finer]).known_answers == 0
+    assert StudyPlanner(study, known.get, [place]).known_answers == 1, "same place, found by the key"
+    assert StudyPlanner(study, {"another": RunAnswer(Outcome.BOUND)}.get, [place]).known_answers == 0
 
 
 def test_workers_get_different_searches_before_any_search_gets_two(study: Study) -> None:
@@ -215,8 +215,7 @@ def test_the_finest_tolerance_begins_at_once_and_takes_what_is_known(scan: int) 
     finest = load_study(
         "critical-hamaker", ["sweep.values=[0.5]", "search.tolerance=1e-9", f"search.scan={scan}"]
     )
-    other = finest.scene_at(0.5, 0.12345)  # not on the grid
-    planner = StudyPlanner(finest, unknown, [other])
+    planner = StudyPlanner(finest, unknown, [(0.5, 0.12345)])  # not on the grid
     run_study(planner, 1, lambda out: 0)
     (point,) = planner.boundary().points
     low, high = point.bracket

@@ -18,6 +18,7 @@ import pytest
 
 from ensemble.store import Store, StoreError, StoreInputError, staging
 from ensemble.store.merge import merge
+from ensemble.store.repair import repair
 from tests.ensemble.catalog_conformance import NOON, boundary
 from tests.ensemble.group_files import unpacked
 from tests.ensemble.runs import assert_same_run, shear_run, shear_scene
@@ -156,7 +157,7 @@ def test_a_lost_or_damaged_catalog_is_refused_and_rebuilt(
         with pytest.raises(StoreInputError, match=r"check --repair"):
             opening(path)
     assert contents(path) == before
-    done = Store.repair(path)
+    done = repair(path)
     assert any("adopted 3 runs" in line for line in done)
     assert keys(path) == known
     with Store.existing(path) as store:
@@ -175,11 +176,11 @@ def test_repair_sets_damaged_runs_aside_so_that_they_are_made_again(tmp_path: Pa
         with pytest.raises(StoreError, match="no readable group"):
             store.load(missing)
     assert [key in problem for key, problem in zip((missing, damaged), problems, strict=True)] == [True] * 2
-    done = Store.repair(path)
+    done = repair(path)
     assert len(done) == 2
     assert keys(path) == {whole}
     assert contents(path / "lost+found" / damaged) == kept
-    assert Store.repair(path) == []
+    assert repair(path) == []
 
 
 def test_a_record_that_this_version_cannot_read_stops_nothing(
@@ -250,8 +251,8 @@ def test_merging_brings_runs_and_the_newer_boundaries(tmp_path: Path) -> None:
         created = {summary.key: summary.created for summary in store.summaries()}
     before = contents(second)
     with Store.existing(second) as source, Store.open(first) as target:
-        assert merge(source, target) == (1, 1, 1)
-        assert merge(source, target) == (0, 0, 2)
+        assert merge(source, target) == (1, 1, 0, 1)
+        assert merge(source, target) == (0, 0, 0, 2)
         assert target.check() == []
         (new,) = target.summaries([f"flow.rate={numbered_run(2).scene.flow.rate}"])
         assert new.created == created[new.key]

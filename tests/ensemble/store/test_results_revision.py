@@ -9,9 +9,10 @@ import pytest
 
 from ensemble.config import run_key as keys
 from ensemble.config.run_key import run_key
-from ensemble.display.result_tables import runs_table
-from ensemble.questions.scene_question import run_document
+from ensemble.display.result_tables import list_table
+from ensemble.questions.scene_question import SceneQuestion, run_document
 from ensemble.store import Store, run_record
+from ensemble.store.listing import Listing
 from ensemble.store.run_record import RunSummary
 from solver import RESULTS_REVISION
 from tests.ensemble.group_files import unpack
@@ -37,7 +38,8 @@ def test_a_run_of_an_earlier_revision_is_kept_beside_the_new_one(tmp_path: Path)
         assert found.key == earlier
         assert run_document(found)["results_revision"] == RESULTS_REVISION - 1
         assert store.check() == []
-        *_, listed = runs_table(store.summaries()).columns
+        answers = SceneQuestion.all_stored(store, Listing(), [])
+        *_, listed = list_table(answers.columns, answers.json_documents).columns
         assert sorted(listed.cells) == sorted([str(RESULTS_REVISION - 1), str(RESULTS_REVISION)])
 
 

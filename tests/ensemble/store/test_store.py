@@ -26,6 +26,7 @@ from zarr.storage import LocalStore, ZipStore
 
 from ensemble.config.run_key import run_key
 from ensemble.store import Store, StoreError, StoreInputError
+from ensemble.store.listing import ParameterRange
 from ensemble.store.run_record import RunSummary, arrays
 from ensemble.store.zarr_groups import ARCHIVE
 from solver.analysis.run import Outcome, Run
@@ -265,6 +266,23 @@ def test_summary_holds_every_scalar(store: Store) -> None:
     assert summary.wall_seconds == run.work.wall_seconds
     assert before <= summary.created <= datetime.now(UTC)
     assert {"vesicle-ensemble", "numpy", "scipy", "numba", "python"} <= summary.versions.keys()
+
+
+def test_parameters_are_found_to_the_last_bit_and_only_within_their_ranges(store: Store) -> None:
+    rates, hamakers = [0.1 + 0.2, 0.3, 1.0], [0.7, 1.01**37]
+    for rate in rates:
+        for hamaker in hamakers:
+            store.save(shear_run(shear_scene(rate=rate, hamaker=hamaker)))
+    store.save(failed_run())
+
+    def found(*ranges: ParameterRange) -> set[tuple[float, ...]]:
+        return set(store.parameters_within(*ranges))
+
+    every = ParameterRange("flow.rate", 0.3, 1.0), ParameterRange("adhesion.hamaker", 0.7, 2.0)
+    assert found(*every) == {(rate, hamaker) for rate in rates for hamaker in hamakers}
+    assert found(ParameterRange("flow.rate", 0.5, 1.0), every[1]) == {(1.0, hamaker) for hamaker in hamakers}
+    assert found(ParameterRange("vesicles.reduced_area", 0.9, 0.9)) == {(0.9,)}
+    assert found(ParameterRange("vesicles.center.0", -2.0, 2.0)) == {(0.0,)}  # of the failed one: one vesicle
 
 
 def test_unknown_run(store: Store) -> None:
