@@ -48,7 +48,8 @@ class Recovery:
         done: list[str] = []
         committed = self._catalog.keys()
         adopted = [self._adopt(directory, done) for directory in self._uncataloged(committed)]
-        committed = self._catalog.keys()
+        if any(adopted):
+            committed = self._catalog.keys()
         for writer in abandoned(self._path / STAGING):
             adopted += [self._adopt_staged(directory, committed) for directory in whole_runs(writer)]
             shutil.rmtree(writer)

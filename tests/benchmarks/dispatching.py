@@ -22,6 +22,7 @@ from ensemble.mpi.dispatcher import Dispatcher, Finished, Ready
 from ensemble.mpi.usage import UsageMeter
 from ensemble.search.point_search import SearchRun
 from ensemble.search.study_planner import StudyPlanner
+from ensemble.search.task_queue import RunAnswer
 from ensemble.store import Store
 from solver.analysis.run import Outcome
 
@@ -47,7 +48,7 @@ class InstantRanks:
 
     def send(self, order: Any, dest: int, tag: int) -> None:
         if isinstance(order, SearchRun):
-            self._reports.append((Finished(None, outcome(order), 1.0), dest))  # type: ignore[arg-type]
+            self._reports.append((Finished(None, answer(order), 1.0), dest))  # type: ignore[arg-type]
 
     def improbe(self, source: int, tag: int, status: Any) -> InstantRanks | None:
         if self._until():
@@ -73,8 +74,9 @@ class BoundaryStore:
         pass
 
 
-def outcome(task: SearchRun) -> Outcome:
-    return Outcome.BOUND if task.value > 0.1 + 0.571 * task.sweep_value else Outcome.SEPARATED
+def answer(task: SearchRun) -> RunAnswer:
+    bound = task.value > 0.1 + 0.571 * task.sweep_value
+    return RunAnswer(Outcome.BOUND if bound else Outcome.SEPARATED)
 
 
 def reports_a_second(points: int, ranks: int, seconds: float, changes: list[str]) -> float:

@@ -12,7 +12,9 @@ from zarr.storage import ZipStore
 
 from ensemble.figures.bifurcation import bifurcation_diagram
 from ensemble.questions import INCOMPLETE_STATUS
-from ensemble.store import Store, StoreError
+from ensemble.questions.branches import StoredBranches
+from ensemble.store import Store, StoreError, StoreInputError
+from ensemble.store.listing import Listing
 from tests.ensemble.group_files import unpacked
 
 TREADING = (
@@ -77,13 +79,16 @@ def test_a_stored_branch_is_shown_listed_checked_and_drawn(ensemble, followed, t
     store, document = followed
     key, place = document["key"], f"--store={store}"
     assert json.loads(ensemble("query", "branches", place, "--json").stdout)[0]["folds"] == document["folds"]
-    for condition, found in (
-        ("flow.rate>0", 1),
-        ("folds.value<0", 0),
-        (f"parameter={document['parameter']}", 1),
-    ):
-        listed = ensemble("query", "branches", place, f"--where={condition}", "--columns=key,folds.0.value")
-        assert len(listed.stdout.splitlines()) == 1 + found
+    with Store.existing(store) as opened:
+        for conditions, found in (
+            (["flow.rate>0", f"parameter={document['parameter']}"], [key]),
+            (["folds.value<0"], []),
+            (["vesicles.reduced_area<0.95", "branch.0.stable=true"], [key]),
+        ):
+            answers = StoredBranches.all_stored(opened, Listing(tuple(conditions), "-created", 5), ["key"])
+            assert [answers.columns[0].value(each) for each in answers.json_documents] == found
+        with pytest.raises(StoreInputError, match=r"unknown field 'flow\.rat'"):
+            StoredBranches.all_stored(opened, Listing(("flow.rat=1",)), [])
     assert "fold" in ensemble("show", key, place).stdout
     file = tmp_path / "diagram.svg"
     assert ensemble("show", key[:8], place, f"--output={file}").returncode == 0
