@@ -5,20 +5,22 @@ from __future__ import annotations
 import threading
 from collections.abc import Awaitable, Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
+from functools import partial
 from pathlib import Path
 from typing import ParamSpec, Protocol, Self, TypeVar
 
 from alembic import command
 from alembic.config import Config
+from anyio import fail_after, to_thread
 from sqlalchemy import Connection, Engine
-from starlette.concurrency import run_in_threadpool
 
 from ensemble.disk import locked
 from ensemble.errors import BadInput
-from ensemble.store.sql_database import UNUSABLE, engine, is_file, reason
+from ensemble.store.sql_database import UNUSABLE, engine, is_file, reason, transaction
 
 MIGRATIONS = "api:database/migrations"
 LOCK = "database.lock"
+READING_SECONDS = 10.0  # for one record
 
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
@@ -85,7 +87,7 @@ class Database(AbstractContextManager["Database"]):
     @contextmanager
     def begin(self) -> Iterator[Connection]:
         """Open a transaction: durable when the block ends, rolled back if the block raises."""
-        with self._write_lock, self._engine.begin() as connection:
+        with self._write_lock, transaction(self._engine) as connection:
             yield connection
 
     def connect(self) -> AbstractContextManager[Connection]:
@@ -149,6 +151,8 @@ async def read_in_thread(
 ) -> Result:
     """Call a function in another thread; see `LookUp`.
 
+    A server of databases that is reached and says nothing is not waited for; the thread is left to itself.
+
     Parameters
     ----------
     read : callable
@@ -159,8 +163,14 @@ async def read_in_thread(
     -------
     object
         The result of `read`.
+
+    Raises
+    ------
+    TimeoutError
+        If it takes longer than `READING_SECONDS`.
     """
-    return await run_in_threadpool(read, *arguments, **named)
+    with fail_after(READING_SECONDS):
+        return await to_thread.run_sync(partial(read, *arguments, **named), abandon_on_cancel=True)
 
 
 def look_up_for(urls: Iterable[str]) -> LookUp:

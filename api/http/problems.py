@@ -12,7 +12,7 @@ from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from pydantic import BaseModel, ConfigDict
 from pydantic_core import ErrorDetails
-from sqlalchemy.exc import InterfaceError, OperationalError
+from sqlalchemy.exc import InterfaceError, InternalError, OperationalError
 from sqlalchemy.exc import TimeoutError as NoConnectionLeft
 from starlette.exceptions import HTTPException
 
@@ -24,6 +24,10 @@ MEDIA_TYPE = "application/problem+json"
 MAXIMUM_FIELDS = 10  # invalid fields that one answer names
 LONGEST_DETAIL = 2000  # characters
 RETRY_SECONDS = 10  # after which a client may ask again where the database did not answer
+
+# What is raised while the database or the disk is away or read-only: it passes without a
+# change of the request. An `InternalError` is that of a server which has become a read-only copy.
+OUTAGES = (OperationalError, InterfaceError, InternalError, NoConnectionLeft, OSError)
 
 _log = logging.getLogger("uvicorn.error")
 
@@ -100,8 +104,8 @@ def install_handlers(app: FastAPI, missing: Iterable[type[Exception]]) -> None:
     app.add_exception_handler(RequestValidationError, _validation_error)
     app.add_exception_handler(BadInput, _bad_input)
     app.add_exception_handler(StoreError, _damage)
-    for trouble in (OperationalError, InterfaceError, NoConnectionLeft):
-        app.add_exception_handler(trouble, _no_database)
+    for trouble in OUTAGES:
+        app.add_exception_handler(trouble, _outage)
     for error in missing:
         app.add_exception_handler(error, _missing_resource)
     app.add_exception_handler(Exception, _server_error)
@@ -160,11 +164,31 @@ def _damage(request: Request, error: Exception) -> Response:
     return _response(Problem(HTTPStatus.CONFLICT, detail))
 
 
-def _no_database(request: Request, error: Exception) -> Response:
+def unavailable(what: str) -> Problem:
+    """Return the problem that a client may ask again later.
+
+    Parameters
+    ----------
+    what : str
+        Which part cannot be used, and why.
+
+    Returns
+    -------
+    Problem
+        503 with `Retry-After`.
+    """
+    return Problem(HTTPStatus.SERVICE_UNAVAILABLE, what, {"Retry-After": str(RETRY_SECONDS)})
+
+
+def _outage(request: Request, error: Exception) -> Response:
+    # The paths that the error may name are for the log only.
     _log.error("%s: %s", request.url.path, reason(error))
+    if isinstance(error, OSError) and not isinstance(error, TimeoutError):
+        return _response(
+            unavailable(f"the store cannot be used at the moment: {error.strerror or 'disk error'}")
+        )
     cause = "its disk is full" if "full" in reason(error) else "it does not answer or cannot be written to"
-    detail = f"the database cannot be used at the moment: {cause}"
-    return _response(Problem(HTTPStatus.SERVICE_UNAVAILABLE, detail, {"Retry-After": str(RETRY_SECONDS)}))
+    return _response(unavailable(f"the database cannot be used at the moment: {cause}"))
 
 
 def _missing_resource(request: Request, _: Exception) -> Response:

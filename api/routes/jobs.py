@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import AsyncIterator
 from http import HTTPStatus
 from pathlib import Path as FilePath
@@ -16,18 +17,22 @@ from api.auth import TokenScope
 from api.http.caching import json_response
 from api.http.openapi import reference
 from api.http.paging import CollectionPage, Limit, page_response
-from api.http.problems import Problem, documented
+from api.http.problems import OUTAGES, Problem, documented, unavailable
 from api.jobs.job import Job, JobStatus, NoSuchJob, TooManyJobs
 from api.jobs.submissions import CheckedSubmission, Estimate, Submission
 from api.routes.service import Reader, Service, Submitter
 from api.settings import Settings
 from ensemble.errors import BadInput
 from ensemble.store import Record
+from ensemble.store.sql_database import reason
 
 router = APIRouter(tags=["jobs"])
 
+_log = logging.getLogger("uvicorn.error")
+
 JobKey = Annotated[str, Path(pattern="^[0-9a-z-]{1,64}$", description="Identifier of the job.")]
 LOG_BYTES = 1 << 20  # largest part of a log that is sent
+ACCEPT_SECONDS = 20.0  # for a job to be on disk
 SUBMISSION_BODY = {
     "requestBody": {"required": True, "content": {"application/json": {"schema": reference(Submission)}}}
 }
@@ -132,7 +137,9 @@ async def submit_job(
     )
     # Awaited through `wait`: if the client disconnects, the transaction, which other jobs share, goes on.
     accepted = asyncio.wrap_future(pending.accepted)
-    await asyncio.wait([accepted])
+    await asyncio.wait([accepted], timeout=ACCEPT_SECONDS)
+    if not accepted.done():
+        raise unavailable("the database does not answer; repeat the request with its Idempotency-Key")
     accepted.result()
     try:
         result = await service.look_up(service.jobs.result, pending)
@@ -305,7 +312,8 @@ async def watch_job(
 ) -> AsyncIterator[ServerSentEvent]:
     """Send the present state of the job, and the new one after each change, until the job has finished.
 
-    The stream ends, too, when the token is revoked or expires, and when the server stops.
+    The stream ends, too, when the token is revoked or expires, and when the server stops. While the
+    database or the disk is away a comment says so, and the stream goes on afterwards.
 
     Parameters
     ----------
@@ -319,16 +327,28 @@ async def watch_job(
     ServerSentEvent
     """
     service = reader.service
+    is_away = False
     yield ServerSentEvent(event="job", raw_data=record.json)
     while not Job.model_validate_json(record.json).status.finished:
-        latest = record
-        while latest == record:
-            await asyncio.sleep(service.settings.event_seconds)
-            if request.state.connection.is_stopping or not await reader.is_valid():
+        await asyncio.sleep(service.settings.event_seconds)
+        if request.state.connection.is_stopping:
+            return
+        try:
+            if not await reader.is_valid():
                 return
             latest = await _watched_job(service, record.key)
-        record = latest
-        yield ServerSentEvent(event="job", raw_data=record.json)
+        except OUTAGES as error:
+            if not is_away:
+                _log.error("%s: %s", request.url.path, reason(error))
+                yield ServerSentEvent(
+                    comment="the database cannot be used at the moment; the stream goes on later"
+                )
+            is_away = True
+            continue
+        is_away = False
+        if latest != record:
+            record = latest
+            yield ServerSentEvent(event="job", raw_data=record.json)
 
 
 async def _watched_job(service: Service, identifier: str) -> Record:

@@ -15,10 +15,11 @@ from prometheus_client.registry import Collector
 from pydantic import BaseModel
 from sqlalchemy.exc import SQLAlchemyError
 
-from api.http.problems import Problem, documented
+from api.database.service_database import read_in_thread
+from api.http.problems import documented, unavailable
 from api.jobs.job import JobStatus
 from api.jobs.job_queue import Jobs
-from api.routes.service import Reader, service_of
+from api.routes.service import Reader, Service, service_of
 from ensemble.disk import require_space
 
 COUNT_SECONDS = 5.0  # for which the numbers of jobs are kept: to count a million of them takes 0.1 s
@@ -74,7 +75,7 @@ async def check_alive() -> Health:
 
 
 @health_router.get("/readyz", responses=documented(HTTPStatus.SERVICE_UNAVAILABLE))
-def check_ready(request: Request) -> Health:
+async def check_ready(request: Request) -> Health:
     """Answer with 200 if the store and the database of jobs can be read and written to, else with 503.
 
     Parameters
@@ -92,15 +93,19 @@ def check_ready(request: Request) -> Health:
     """
     service = service_of(request)
     try:
-        service.jobs.records.page(limit=1)
-        service.store.boundaries_page(limit=1)
-        require_space(service.store.path)
-    except SQLAlchemyError as error:
-        raise Problem(HTTPStatus.SERVICE_UNAVAILABLE, "the store or the database cannot be read") from error
+        await read_in_thread(_use_all, service)
+    except (SQLAlchemyError, TimeoutError) as error:
+        raise unavailable("the store or the database cannot be read") from error
     except OSError as error:
-        detail = f"the store cannot be written to ({error.strerror})"
-        raise Problem(HTTPStatus.SERVICE_UNAVAILABLE, detail) from error
+        raise unavailable(f"the store cannot be written to ({error.strerror})") from error
     return Health(status="ready")
+
+
+def _use_all(service: Service) -> None:
+    """Read both databases and write to the disk; what does not work raises its error."""
+    service.jobs.records.page(limit=1)
+    service.store.boundaries_page(limit=1)
+    require_space(service.store.path)
 
 
 @metrics_router.get("/metrics", response_class=PlainTextResponse)

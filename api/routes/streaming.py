@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import AsyncIterator, Iterator
 from itertools import chain
 
@@ -9,7 +10,11 @@ from fastapi import Request
 from fastapi.responses import StreamingResponse
 from starlette.concurrency import iterate_in_threadpool
 
+from api.http.problems import OUTAGES
 from api.routes.service import Caller
+from ensemble.store.sql_database import reason
+
+_log = logging.getLogger("uvicorn.error")
 
 BEGINNING_BYTES = 1 << 16
 
@@ -18,8 +23,8 @@ def stream(caller: Caller, request: Request, pieces: Iterator[bytes], media_type
     """Return an answer that is made while it is sent.
 
     Its beginning, and so all of a short answer, is made at once: an error in it is answered as such. If the
-    token of the request is revoked or expires, the connection is closed: the client sees that the answer is
-    incomplete.
+    token of the request is revoked or expires, or the disk or the database fails, the connection is closed:
+    the client sees that the answer is incomplete.
 
     Parameters
     ----------
@@ -40,10 +45,15 @@ def stream(caller: Caller, request: Request, pieces: Iterator[bytes], media_type
     all_pieces = chain([bytes(beginning)], pieces)
 
     async def while_valid() -> AsyncIterator[bytes]:
-        async for piece in iterate_in_threadpool(all_pieces):
-            if not await caller.is_valid():
-                request.state.connection.abort()
+        try:
+            async for piece in iterate_in_threadpool(all_pieces):
+                if not await caller.is_valid():
+                    break
+                yield piece
+            else:
                 return
-            yield piece
+        except OUTAGES as error:
+            _log.error("%s: %s", request.url.path, reason(error))
+        request.state.connection.abort()
 
     return StreamingResponse(while_valid(), media_type=media_type)

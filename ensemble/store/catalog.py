@@ -21,7 +21,7 @@ from ensemble.store.catalog_tables import (
 from ensemble.store.filters import conditions, order, within
 from ensemble.store.listing import BATCH, Listing, ParameterRange
 from ensemble.store.run_record import RunSummary
-from ensemble.store.sql_database import Place, engine, reading_engine
+from ensemble.store.sql_database import Place, engine, reading_engine, transaction
 from ensemble.timestamp import timestamp_text
 
 # As text, since most of those who ask pass it on.
@@ -52,7 +52,7 @@ class Catalog:
 
     def require_writable(self) -> None:
         """Raise a database error unless a row could be written now."""
-        with self._engine.begin() as connection:
+        with transaction(self._engine) as connection:
             # Changes nothing, and takes what a change takes: the lock, the journal and the permission.
             connection.execute(delete(RunRow).where(RunRow.key == ""))
 
@@ -74,12 +74,12 @@ class Catalog:
         key : str
             Of the run.
         """
-        with self._engine.begin() as connection:
+        with transaction(self._engine) as connection:
             connection.execute(delete(RunRow).where(RunRow.key == key))
 
     def create(self) -> None:
         """Create the tables that are not there yet."""
-        with self._engine.begin() as connection:
+        with transaction(self._engine) as connection:
             if self._schema is not None:
                 connection.execute(CreateSchema(self._schema, if_not_exists=True))
             Table.metadata.create_all(connection)
@@ -100,7 +100,7 @@ class Catalog:
             "created": timestamp_text(summary.created),
             "document": summary.document(),
         }
-        with self._engine.begin() as connection:
+        with transaction(self._engine) as connection:
             connection.execute(insert(RunRow), row)
 
     def keys(self) -> set[str]:
@@ -220,7 +220,7 @@ class Catalog:
             "updated": timestamp_text(boundary.updated),
             "document": boundary.model_dump(mode="json"),
         }
-        with self._engine.begin() as connection:
+        with transaction(self._engine) as connection:
             connection.execute(delete(BoundaryRow).where(BoundaryRow.study_key == boundary.study_key))
             connection.execute(insert(BoundaryRow), row)
 

@@ -11,8 +11,8 @@ from __future__ import annotations
 import secrets
 import shutil
 import sqlite3
-from collections.abc import Callable
-from contextlib import closing
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -21,7 +21,7 @@ from urllib.parse import quote
 
 from pydantic import BaseModel, ConfigDict
 from pydantic_settings import BaseSettings, SettingsConfigDict
-from sqlalchemy import URL, Engine, create_engine, event, make_url
+from sqlalchemy import URL, Connection, Engine, create_engine, event, make_url
 from sqlalchemy.engine.interfaces import DBAPIConnection
 from sqlalchemy.exc import (
     ArgumentError,
@@ -38,6 +38,16 @@ from ensemble.disk import flush, replacing
 CATALOG = "catalog.sqlite"
 PLACE = "catalog.json"
 BUSY_SECONDS = 60
+
+# Of a server: a host that drops packets must not let a request wait for minutes, as it does by default.
+POOL_SECONDS = 10  # for a connection of the pool to become free
+CONNECTING = {
+    "connect_timeout": 5,
+    "tcp_user_timeout": 10_000,  # milliseconds for which what was sent may stay without an answer of the host
+    "keepalives_idle": 5,
+    "keepalives_interval": 2,
+    "keepalives_count": 3,
+}
 
 Journal = Literal["wal", "delete"]
 
@@ -170,13 +180,55 @@ def engine(url: str, journal: Journal = "wal") -> Engine:
     Engine
     """
     if not is_file(url):
-        return create_engine(url, pool_pre_ping=True)
+        return _server_engine(url)
     made = create_engine(url, connect_args={"timeout": BUSY_SECONDS})
     event.listen(made, "connect", partial(_durable, journal))
     path = Path(make_url(url).database or "")
     event.listen(made, "connect", partial(_note_file, path))
     event.listen(made, "checkout", partial(_require_same_file, path))
     return made
+
+
+def _server_engine(url: str) -> Engine:
+    """Make what connects to a server.  Options in the URL come before those here."""
+    address = make_url(url)
+    is_postgresql = address.get_backend_name() == "postgresql"
+    options = {name: value for name, value in CONNECTING.items() if name not in address.query}
+    return create_engine(
+        address,
+        pool_pre_ping=True,
+        pool_timeout=POOL_SECONDS,
+        connect_args=options if is_postgresql else {},
+    )
+
+
+@contextmanager
+def transaction(engine: Engine) -> Iterator[Connection]:
+    """Open a transaction: durable when the block ends, rolled back if the block raises.
+
+    Parameters
+    ----------
+    engine : Engine
+
+    Yields
+    ------
+    Connection
+
+    Raises
+    ------
+    sqlalchemy.exc.OperationalError
+        If an SQLite file was moved or deleted in the meantime, and what was committed with it.
+    """
+    with engine.begin() as connection:
+        used = connection.info.get("file")
+        yield connection
+    path = engine.url.database
+    if used is not None and path and _identity(Path(path)) != used:
+        raise _missing(Path(path))
+
+
+def _missing(path: Path) -> OperationalError:
+    return OperationalError(None, None, FileNotFoundError(f"{path.name} has been moved or deleted"))
 
 
 def _note_file(path: Path, _: DBAPIConnection, record: ConnectionPoolEntry) -> None:
@@ -187,7 +239,7 @@ def _require_same_file(path: Path, _: DBAPIConnection, record: ConnectionPoolEnt
     """Refuse a connection to a file that is no longer in its place: what it took would be lost with it."""
     present = _identity(path)
     if present is None:
-        raise OperationalError(None, None, FileNotFoundError(f"{path.name} has been moved or deleted"))
+        raise _missing(path)
     if present != record.info["file"]:
         raise DisconnectionError  # the pool connects to the one that is there now
 
@@ -216,7 +268,7 @@ def reading_engine(url: str) -> Engine:
     """
     path = make_url(url).database if is_file(url) else None
     if path is None:
-        return create_engine(url, pool_pre_ping=True)
+        return _server_engine(url)
     return create_engine("sqlite://", creator=partial(_connect_to_read, Path(path)), poolclass=QueuePool)
 
 
@@ -278,4 +330,5 @@ def reason(error: BaseException) -> str:
     -------
     str
     """
-    return str(getattr(error, "orig", None) or error).splitlines()[0]
+    lines = str(getattr(error, "orig", None) or error).splitlines()
+    return lines[0] if lines else type(error).__name__  # a TimeoutError says nothing more

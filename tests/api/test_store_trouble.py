@@ -4,9 +4,17 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
 
+import pytest
+from sqlalchemy import Connection, text
+from sqlalchemy.exc import OperationalError
+
+from api.database.service_database import Database
+from api.settings import Settings
 from ensemble.store import Store
+from ensemble.store.sql_database import CATALOG, Place, engine, reason, transaction
 from tests.api.servers import client_of
 from tests.ensemble.group_files import unpack
 from tests.ensemble.runs import shear_run
@@ -79,3 +87,35 @@ def test_a_store_that_is_moved_while_it_is_served_takes_no_job(store: Path) -> N
         assert client.get("/readyz").status_code == 200
         assert client.post("/jobs", json={"preset": "doublet-shear"}).status_code == 202
         assert len(client.get("/jobs").json()["items"]) == 2
+
+
+def write_and_then(opened: AbstractContextManager[Connection], trouble: Callable[[], object]) -> None:
+    """Write in a transaction, and let something happen before it is committed."""
+    with opened as connection:
+        connection.execute(text("CREATE TABLE something (number INTEGER)"))
+        trouble()
+
+
+def test_what_is_committed_to_a_deleted_store_is_not_acknowledged(store: Path) -> None:
+    # Costs 0.5 s.
+    catalog = engine(Place.of(store).url, journal="delete")
+    with pytest.raises(OperationalError, match="moved or deleted"):
+        write_and_then(transaction(catalog), (store / CATALOG).unlink)
+    catalog.dispose()
+    with (
+        Database.open(Settings(store=store).database_url, store) as database,
+        pytest.raises(OperationalError, match="moved or deleted"),
+    ):
+        write_and_then(database.begin(), lambda: shutil.rmtree(store))
+
+
+def test_a_full_disk_refuses_with_a_time_to_ask_again(tmp_path: Path) -> None:
+    # Costs 1 s.
+    with small_disk(tmp_path / "disk", ROOM) as disk:
+        Store.open(disk / "store").close()
+        with client_of(disk / "store") as client, filled(disk):
+            assert client.get("/readyz").headers["retry-after"]
+
+
+def test_an_error_without_words_has_a_reason() -> None:
+    assert reason(TimeoutError()) == "TimeoutError"
