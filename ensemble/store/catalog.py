@@ -18,7 +18,7 @@ from ensemble.store.catalog_tables import (
     RunRow,
     Table,
 )
-from ensemble.store.filters import conditions, order, within
+from ensemble.store.filters import conditions, number, order, within
 from ensemble.store.listing import BATCH, Listing, ParameterRange
 from ensemble.store.run_record import RunSummary
 from ensemble.store.sql_database import Place, engine, reading_engine, transaction
@@ -171,20 +171,23 @@ class Catalog:
         return self._batches(keys.order_by(row.created.desc(), row.key.desc()), listing, _RUN, row.key)
 
     def runs_within(self, ranges: Sequence[ParameterRange]) -> Iterator[Record]:
-        """Find the runs whose scenes have parameters within some ranges.
+        """Find runs whose scenes have parameters within some ranges, one for each combination of values.
 
         Parameters
         ----------
         ranges : sequence of ParameterRange
-            All of them must hold the run, but for a rounding error of the database.
+            Of numbers in the scene.
 
         Returns
         -------
         iterator of Record
             See `runs`.
         """
-        met = [within(each, RunRow.document, RUN_FIELDS) for each in ranges]
-        return self._batches(select(RunRow.key).where(*met), Listing(), _RUN, RunRow.key)
+        document = RunRow.document
+        met = [within(each, document, RUN_FIELDS) for each in ranges]
+        values = [number(each.path, document, RUN_FIELDS) for each in ranges]
+        keys = select(func.min(RunRow.key)).where(*met).group_by(*values)
+        return self._batches(keys, Listing(), _RUN, RunRow.key)
 
     def runs_page(self, where: Sequence[str], after: str | None, limit: int) -> list[Record]:
         """Return a part of the runs that meet all filters, newest first.

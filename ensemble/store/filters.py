@@ -242,6 +242,33 @@ def within(values: ParameterRange, document: JsonColumn, fields: Fields) -> Colu
     )
 
 
+def number(path: str, document: JsonColumn, fields: Fields) -> ColumnElement[Any]:
+    """Return the number at a path of a JSON column, null where there is none.
+
+    Parameters
+    ----------
+    path : str
+        Dotted path; of the elements of an array the first counts.
+    document : column
+        JSON of the records.
+    fields : mapping of str to Field
+        The fields with which a path may begin.
+
+    Returns
+    -------
+    ColumnElement
+    """
+    return _number(_first(document, field_at(path, fields, "where")))
+
+
+def _first(document: JsonColumn, field: Field) -> Any:
+    return document[tuple(0 if part == EACH else part for part in field.location)]
+
+
+def _number(element: Any) -> ColumnElement[Any]:
+    return case((json_type(element).in_(NUMBERS), element.as_float()), else_=None)
+
+
 def order(text: str, document: JsonColumn, fields: Fields) -> list[ColumnElement[Any]]:
     """Turn a field into what sorts records by it; those without the quantity come last.
 
@@ -269,9 +296,8 @@ def order(text: str, document: JsonColumn, fields: Fields) -> list[ColumnElement
     kinds = set(alternatives(field.annotation))
     if any(_is_group(kind) for kind in kinds):
         raise StoreInputError(f"sort: {path} is a group of fields; name one of them")
-    element = document[tuple(0 if part == EACH else part for part in field.location)]
-    number = case((json_type(element).in_(NUMBERS), element.as_float()), else_=None)
-    keys = [number] if kinds & {float, int, Any} else []
+    element = _first(document, field)
+    keys: list[ColumnElement[Any]] = [_number(element)] if kinds & {float, int, Any} else []
     keys += [element.as_string()] if kinds - {float, int} else []
     return [
         ordering

@@ -449,7 +449,7 @@ class Store(AbstractContextManager["Store"]):
         Yields
         ------
         tuple of float
-            For each run that has all of these parameters: their values, to the last bit.
+            Each combination of their values in a run, to the last bit.
         """
         for record in self._catalog.runs_within(ranges):
             scene = json.loads(record.json)["scene"]

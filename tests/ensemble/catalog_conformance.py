@@ -14,7 +14,7 @@ import pytest
 from ensemble.config.run_key import run_key
 from ensemble.search.boundary import Boundary, BoundaryPoint
 from ensemble.store import NotStored, Store, StoreInputError
-from ensemble.store.listing import Listing
+from ensemble.store.listing import Listing, ParameterRange
 from ensemble.store.run_record import RunSummary
 from solver.analysis.run import Outcome
 from solver.scene import Numerics
@@ -166,6 +166,12 @@ class CatalogConformance:
 
         assert listed(None) == rates
         assert listed(2) == rates[:2]
+
+    def test_parameters_within_ranges(self, filled: Store) -> None:
+        rate, hamaker = ParameterRange("flow.rate", 0.25, 0.5), ParameterRange("adhesion.hamaker", 1.1, 4.0)
+        assert set(filled.parameters_within(rate)) == {(0.25,), (RATES[2],), (0.5,)}
+        assert set(filled.parameters_within(rate, hamaker)) == {(RATES[2], 4 * RATES[2]), (0.5, 2.0)}
+        assert list(filled.parameters_within(ParameterRange("vesicles.reduced_area", 0.9, 0.9))) == [(0.9,)]
 
     @pytest.mark.parametrize("sort", ["flow", "flow.rat", "vesicles", "vesicles.center", "", "--flow.rate"])
     def test_what_cannot_be_sorted_by_is_named(self, filled: Store, sort: str) -> None:
