@@ -2,8 +2,9 @@
 
 The environment variable ``ENSEMBLE_DATABASE``, such as ``postgresql+psycopg://user@host/name``, names the
 server when a store is made.  The store keeps it in a file that only its owner may read, because the URL may
-hold a password.  So nobody who opens the store later has to know where its catalog is.  Several stores may
-share a database: the catalog of each is in a schema of its own.
+hold a password.  So nobody who opens the store later has to know where its catalog is.  If the variable names
+a server then, only the schema is taken from the file: roles, passwords and hosts may change.  Several stores
+may share a database: the catalog of each is in a schema of its own.
 """
 
 from __future__ import annotations
@@ -94,7 +95,11 @@ class Place(BaseModel):
         """
         kept = store / PLACE
         if kept.exists():
-            return cls.model_validate_json(kept.read_bytes())
+            place = cls.model_validate_json(kept.read_bytes())
+            url = DatabaseSettings().database
+            if url is None or is_file(url) or place.schema_name is None:
+                return place
+            return cls(url=url, schema_name=place.schema_name)  # a role or a password may have changed
         return cls(url=sqlite_url(store / CATALOG), schema_name=None)
 
     @classmethod

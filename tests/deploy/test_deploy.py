@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from sqlalchemy import make_url
 
 ROOT = Path(__file__).parents[2]
 DEPLOY = ROOT / "deploy"
@@ -73,6 +74,18 @@ def test_the_container_copies_what_the_package_is_built_from(tmp_path: Path) -> 
     )
     assert built.returncode == 0, built.stderr
     assert list(tmp_path.glob("*.whl"))
+
+
+@pytest.mark.parametrize("password", ["p@ss", "a/b:c", "100%25", "#?&=", "ä ö"])
+def test_any_password_reaches_the_database_of_compose(password: str) -> None:
+    compose = yaml.safe_load((DEPLOY / "compose.yaml").read_text(encoding="utf-8"))
+    environment = {
+        name: text.replace("${POSTGRES_PASSWORD:?}", password)
+        for name, text in compose["services"]["server"]["environment"].items()
+    }
+    url = make_url(environment["ENSEMBLE_DATABASE"])
+    assert (url.username, url.host, url.port, url.database) == ("ensemble", "database", None, "ensemble")
+    assert (url.password or environment.get("PGPASSWORD")) == password
 
 
 @pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="no systemd")

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from pydantic import ValidationError
-from sqlalchemy import text
+from sqlalchemy import make_url, text
 
 from ensemble.store import Store, StoreError, StoreInputError, staging
 from ensemble.store.sql_database import PLACE, Place, engine
@@ -66,6 +66,20 @@ class TestPostgreSQL(CatalogConformance):
                 opening(store.path)
             assert "\n" not in str(refused.value)
         assert (store.path / "runs" / key).is_dir()
+
+    def test_a_renamed_role_is_taken_from_the_environment(
+        self, store: Store, database: str, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        # Costs 1 s.
+        key = store.save(shear_run())
+        kept = make_url(Place.of(store.path).url)
+        lost = kept.set(username="renamed").render_as_string(hide_password=False)
+        Place(url=lost, schema_name=Place.of(store.path).schema_name).keep(store.path)
+        with pytest.raises(StoreInputError, match="renamed"):
+            Store.existing(store.path)
+        monkeypatch.setenv("ENSEMBLE_DATABASE", database)
+        with Store.existing(store.path) as opened:
+            assert opened.contains(key)
 
     def test_a_creation_that_was_cut_short_is_completed(self, store: Store) -> None:
         for directory in ("runs", "staging"):
