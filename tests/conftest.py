@@ -16,7 +16,7 @@ from typing import Any
 import hypothesis
 import pytest
 
-from tests import postgresql
+from tests import postgresql, slurm
 from tests.processor_time import ProcessorTimes
 
 # Before anything imports NumPy: the tests run in several processes, whose threads would compete.
@@ -173,3 +173,12 @@ def postgresql_server() -> Iterator[postgresql.Server]:
         pytest.skip("no PostgreSQL server: install the system's package")
     with postgresql.running(programs) as server:
         yield server
+
+
+@pytest.fixture(scope="session")
+def slurm_cluster() -> Iterator[slurm.Cluster]:
+    """A Slurm cluster of one node.  It starts in two seconds."""
+    if reason := slurm.reason_to_skip():
+        pytest.skip(reason)
+    with slurm.running() as cluster:
+        yield cluster

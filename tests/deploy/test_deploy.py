@@ -23,8 +23,12 @@ ENSEMBLE = (sys.executable, "-m", "ensemble")
 SECONDS = 240
 MOST_EXPOSED = 30  # tenths, of the ten that `systemd-analyze security` counts to
 
-# Starts two ranks, as Slurm's own would start as many as the job has.
-SRUN = '#!/usr/bin/env bash\nexec mpirun -n 2 "$@"\n'
+# Starts two ranks, as Slurm's own would start as many as the job has; `test_slurm.py` has the real one.
+SRUN = """\
+#!/usr/bin/env bash
+while [[ $1 == --* ]]; do shift; done
+exec mpirun -n 2 "$@"
+"""
 
 
 def container_lines(instruction: str) -> list[str]:
