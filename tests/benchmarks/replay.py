@@ -1,4 +1,4 @@
-"""Replays a study of thousands of groups in simulated time: are they busy, and the coordinator not?
+"""Replays a study of thousands of groups in simulated time: are they busy, and the dispatcher not?
 
     ensemble bisect --store STORE && python -m tests.benchmarks.replay STORE
 
