@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from solver.analysis.run import Energy, Errors, Frames, Outcome, Run, Series, Viscosity, Work
     from solver.revision import RESULTS_REVISION
     from solver.scene import Scene
-    from solver.simulation.simulate import Cancelled, simulate
+    from solver.simulation.simulate import Cancelled, Simulation, simulate
 
 __all__ = [
     "RESULTS_REVISION",
@@ -23,6 +23,7 @@ __all__ = [
     "Run",
     "Scene",
     "Series",
+    "Simulation",
     "Viscosity",
     "Work",
     "simulate",
@@ -32,6 +33,7 @@ _MODULES = {
     "RESULTS_REVISION": "solver.revision",
     "Cancelled": "solver.simulation.simulate",
     "Scene": "solver.scene",
+    "Simulation": "solver.simulation.simulate",
     "simulate": "solver.simulation.simulate",
 }  # of the others: that of results
 

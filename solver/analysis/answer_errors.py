@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from solver.analysis.line_of_centers import LineOfCenters
 from solver.analysis.state_error import magnitude
 from solver.integrators.control import root_mean_square
+from solver.memory import Remembering, Saved
 
 if TYPE_CHECKING:
     from solver.analysis.revolutions import RevolutionTracker
@@ -34,7 +35,7 @@ class _Sample(NamedTuple):
     error: Array  # (state_size, 2), see `Step`
 
 
-class AnswerErrors:
+class AnswerErrors(Remembering):
     """Follows a run, and compares its answers with those of the trajectory y − e.
 
     Parameters
@@ -49,12 +50,24 @@ class AnswerErrors:
         large as the estimated one.
     """
 
+    memory = ("_at_passages", "_samples", "_separation", "sensitive")
+
     def __init__(self, tracker: RevolutionTracker | None) -> None:
         self._tracker = tracker
         self._at_passages: list[Array] = []
         self._samples: list[_Sample] = []
         self._separation: Array | None = None
         self.sensitive = False
+
+    def restore(self, saved: Saved) -> None:
+        """Remember what another one did; see `Remembering`.
+
+        Parameters
+        ----------
+        saved : dict
+        """
+        super().restore(saved)
+        self._samples = [_Sample(*sample) for sample in self._samples]
 
     def follow(self, step: Step) -> None:
         """Take in a step after the tracker has.

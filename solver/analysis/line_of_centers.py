@@ -47,6 +47,14 @@ class LineOfCenters(RevolutionTracker):
     """
 
     direction_period = 2 * np.pi
+    memory = (
+        *RevolutionTracker.memory,
+        "distance",
+        "separated_distance",
+        "separated",
+        "openings",
+        "_opening",
+    )
 
     def __init__(
         self, membranes: Membranes, state: Array, counted: CountedDirection, separated_distance: float

@@ -17,6 +17,7 @@ from solver.membrane.resampling import resampled_angle, resampled_state
 from solver.membrane.restoring import shape_rates
 from solver.membrane.spectral import resampled
 from solver.membrane.symmetry import independent_vesicles
+from solver.memory import Remembering
 from solver.motion.equation import EquationOfMotion, Motion
 from solver.potentials.proximity import waist_error
 
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-class Recorder:
+class Recorder(Remembering):
     """Collects diagnostics, and states as frames.
 
     Parameters
@@ -52,6 +53,15 @@ class Recorder:
     spatial_position_error : float
         The largest so far; see `solver.analysis.spatial_error.spatial_error`.
     """
+
+    memory = (
+        "samples",
+        "spatial_error",
+        "spatial_position_error",
+        "_vesicle_samples",
+        "_frames",
+        "_previous",
+    )
 
     def __init__(
         self,

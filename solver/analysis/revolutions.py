@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from solver.analysis.settling import has_settled
 from solver.membrane import curve
+from solver.memory import Remembering
 from solver.roots import root
 
 if TYPE_CHECKING:
@@ -65,7 +66,7 @@ def counted_direction(flow: ImposedFlow | None) -> CountedDirection:
     return CountedDirection(float(_DIRECTIONS[fastest]), 1 if rate[fastest] > 0 else -1)
 
 
-class RevolutionTracker(ABC):
+class RevolutionTracker(Remembering, ABC):
     """Follows the angle of a line from step to step.
 
     Parameters
@@ -89,6 +90,7 @@ class RevolutionTracker(ABC):
     """
 
     direction_period: float
+    memory: ClassVar[tuple[str, ...]] = ("angle", "passages", "_first")
 
     def __init__(self, membranes: Membranes, state: Array, counted: CountedDirection) -> None:
         self.membranes = membranes

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from solver.analysis.diagnostics import viscosity_measures
 from solver.analysis.run import Viscosity
 from solver.analysis.spline import spline_integral
+from solver.memory import Remembering
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-class ViscosityHistory:
+class ViscosityHistory(Remembering):
     """The parts of the intrinsic viscosity at the ends of steps, from a step on that is of interest.
 
     They are measured where the step computed its last rate, if that is close to its end: this costs nothing.
@@ -34,6 +35,8 @@ class ViscosityHistory:
     equation : EquationOfMotion
         Of this scene.
     """
+
+    memory = ("_times", "_values")
 
     def __init__(self, scene: Scene, equation: EquationOfMotion) -> None:
         self._scene = scene

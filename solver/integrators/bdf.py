@@ -23,6 +23,7 @@ from solver.integrators.backward_differences import (
 from solver.integrators.control import root_mean_square
 from solver.integrators.integrator import InitialValueProblem, Integrator, Step, StepFailedError, register
 from solver.integrators.propagated_error import Evaluation, LinearizedStep, PropagatedError
+from solver.memory import Remembering, Saved
 
 if TYPE_CHECKING:
     from solver.scene import Numerics
@@ -70,7 +71,7 @@ class _Solution:
     last: Evaluation
 
 
-class BackwardDifferentiation:
+class BackwardDifferentiation(Remembering):
     """BDF with an absolute tolerance on every component of the state.
 
     Tangent angles grow without bound while a membrane treads, so a tolerance relative to them would loosen
@@ -83,6 +84,17 @@ class BackwardDifferentiation:
     tolerance : float
         Largest local error of a step, root mean square.
     """
+
+    memory = (
+        "jacobian_evaluations",
+        "factorizations",
+        "_time",
+        "_size",
+        "_table",
+        "_order",
+        "_equal_steps",
+        "_slow",
+    )
 
     def __init__(self, problem: InitialValueProblem, tolerance: float) -> None:
         self._equation = problem.equation
@@ -102,6 +114,35 @@ class BackwardDifferentiation:
         self._solve: Callable[[Array], Array] | None = None
         error = np.zeros((problem.state.size, 2)) if problem.error is None else problem.error
         self._error = PropagatedError(problem.equation.rate, error) if self._jacobian.exact else None
+
+    def saved(self) -> Saved:
+        """Return the history, and the Jacobian in use; see `Remembering`.
+
+        Returns
+        -------
+        dict
+        """
+        return {
+            **super().saved(),
+            "jacobian": self._jacobian.saved(),
+            "factorized": self._solve is not None,
+            "error": self._error.saved(self._jacobian) if self._error else None,
+        }
+
+    def restore(self, saved: Saved) -> None:
+        """Go on where another one was; see `Remembering`.
+
+        Parameters
+        ----------
+        saved : dict
+        """
+        super().restore(saved)
+        self._jacobian = self._equation.restored_jacobian(saved["jacobian"])
+        # The same matrix has the same factors, to the last bit.
+        duration = self._size / _ALPHA[self._order]
+        self._solve = self._jacobian.solver(duration) if saved["factorized"] else None
+        if self._error:
+            self._error.restore(saved["error"], self._jacobian)
 
     def step(self) -> Step:
         """Take one step; see `Integrator`.

@@ -10,6 +10,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.memory import Remembering
+
 Array = NDArray[np.float64]
 
 _SAFETY = 0.9  # factor of the step size that keeps the next error below what is allowed
@@ -214,7 +216,7 @@ class ConservedError:
         return float(drift) / (self._allowed_rate * attempt.size)
 
 
-class AdaptiveStep:
+class AdaptiveStep(Remembering):
     """Chooses step sizes from a measured error, with no growth right after a rejection.
 
     Parameters
@@ -223,6 +225,8 @@ class AdaptiveStep:
     first_error : float
         Error, root mean square of the state, that Euler's method would make in the first step.
     """
+
+    memory = ("_may_grow",)
 
     def __init__(self, measure: ErrorMeasure, first_error: float) -> None:
         self._measure = measure

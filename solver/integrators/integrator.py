@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
+    from solver.memory import Saved
     from solver.motion.jacobian import Jacobian
     from solver.scene import Numerics
 
@@ -48,6 +49,19 @@ class DifferentialEquation(Protocol):
         Parameters
         ----------
         state : (n,)
+
+        Returns
+        -------
+        Jacobian
+        """
+
+    def restored_jacobian(self, saved: Saved) -> Jacobian:
+        """Return a Jacobian that `jacobian` once returned.
+
+        Parameters
+        ----------
+        saved : dict
+            As `Jacobian.saved` returned it.
 
         Returns
         -------
@@ -160,6 +174,22 @@ class Integrator(Protocol):
         ------
         StepFailedError
             If no step of representable size satisfies the tolerance.
+        """
+
+    def saved(self) -> Saved:
+        """Return what decides the steps to come; `solver.memory.Remembering` has it from a list of names.
+
+        Returns
+        -------
+        dict
+        """
+
+    def restore(self, saved: Saved) -> None:
+        """Go on where another integrator of the same problem was.
+
+        Parameters
+        ----------
+        saved : dict
         """
 
 

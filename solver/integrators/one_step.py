@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from solver.integrators.control import Attempt, StepControl, root_mean_square
 from solver.integrators.integrator import DifferentialEquation, InitialValueProblem, Step, StepFailedError
+from solver.memory import Remembering
 
 if TYPE_CHECKING:
     from solver.motion.jacobian import Jacobian
@@ -109,8 +110,10 @@ class OneStepMethod(Protocol):
         """
 
 
-class OneStepIntegrator:
+class OneStepIntegrator(Remembering):
     """A one-step method in steps of a controlled size.
+
+    The method has no memory.
 
     Parameters
     ----------
@@ -118,6 +121,16 @@ class OneStepIntegrator:
     control : StepControl
     problem : InitialValueProblem
     """
+
+    memory = (
+        "jacobian_evaluations",
+        "factorizations",
+        "_control",
+        "_time",
+        "_state",
+        "_slope",
+        "_size",
+    )
 
     def __init__(self, method: OneStepMethod, control: StepControl, problem: InitialValueProblem) -> None:
         self.jacobian_evaluations = 0

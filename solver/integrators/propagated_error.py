@@ -14,6 +14,7 @@ the same is done for a second error, whose sources have random signs: the size t
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -31,6 +32,7 @@ from solver.integrators.backward_differences import (
 from solver.integrators.control import root_mean_square
 
 if TYPE_CHECKING:
+    from solver.memory import Saved
     from solver.motion.jacobian import Jacobian
 
 Array = NDArray[np.float64]
@@ -109,6 +111,45 @@ class PropagatedError:
         self._steps = 0
         self._deviation: _Deviation | None = None
         self._random = np.random.default_rng(0)
+
+    def saved(self, jacobian: Jacobian) -> Saved:
+        """Return what decides the errors to come.
+
+        Parameters
+        ----------
+        jacobian : Jacobian
+            Of the last step.  What another one leaves out is of no use any more.
+
+        Returns
+        -------
+        dict
+        """
+        deviation = self._deviation
+        if deviation and deviation.jacobian is not jacobian:
+            deviation = None
+        return {
+            "table": self._table.copy(),
+            "steps": self._steps,
+            "deviation": (deviation.direction.copy(), deviation.rate.copy()) if deviation else None,
+            "random": json.dumps(self._random.bit_generator.state),  # it holds integers of 128 bits
+        }
+
+    def restore(self, saved: Saved, jacobian: Jacobian) -> None:
+        """Go on where another one was.
+
+        Parameters
+        ----------
+        saved : dict
+        jacobian : Jacobian
+            The same as that with which it was saved.
+        """
+        self._table, self._steps = saved["table"].copy(), saved["steps"]
+        self._deviation = None
+        if saved["deviation"]:
+            direction, rate = saved["deviation"]
+            # A column in memory, as the error is that was probed: its products are then the same to the bit.
+            self._deviation = _Deviation(jacobian, np.stack([direction, direction], axis=1)[:, 0], rate)
+        self._random.bit_generator.state = json.loads(saved["random"])
 
     def advance(self, step: LinearizedStep, local_error: Array, remainder: Array, near: Evaluation) -> None:
         """Follow one step.

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.forces.tension import TensionInverse
 from solver.membrane.geometry import Geometry, Membranes
 from solver.membrane.spectral import differentiation, highest_modes, integration
 from solver.membrane.tangential_velocity import (
@@ -21,7 +22,7 @@ from solver.membrane.tangential_velocity import (
     tangential_speed_by_curvature,
     tangential_speed_weights,
 )
-from solver.motion.equation import Motion, conserved_quantities
+from solver.motion.equation import Motion, conserved_quantities, restored_motion, saved_motion
 from solver.motion.jacobian import DenseJacobian
 from solver.potentials.proximity import Closeness
 
@@ -29,8 +30,9 @@ if TYPE_CHECKING:
     from solver.flows import ImposedFlow
     from solver.forces.adhesion import DirectAdhesion
     from solver.forces.bending import Bending
-    from solver.forces.tension import Inextensibility, TensionInverse
+    from solver.forces.tension import Inextensibility
     from solver.membrane.restoring import Restoring
+    from solver.memory import Saved
     from solver.potentials.single_layer import SingleLayer
     from solver.potentials.viscosity_contrast import ViscosityContrast
 
@@ -139,6 +141,51 @@ class DenseEquation:
             adhesion = self.adhesion.jacobian(geometry, motion.closeness)
         matrix, self._inverse = self.linearize(motion, adhesion)
         return DenseJacobian(matrix)
+
+    def restored_jacobian(self, saved: Saved) -> DenseJacobian:
+        """Return a Jacobian that `jacobian` once returned; see `EquationOfMotion`.
+
+        Parameters
+        ----------
+        saved : dict
+
+        Returns
+        -------
+        DenseJacobian
+        """
+        return DenseJacobian(saved["matrix"])
+
+    def saved(self) -> Saved:
+        """Return what was kept for the next evaluations; see `EquationOfMotion`.
+
+        Returns
+        -------
+        dict
+        """
+        return {
+            "evaluations": self.evaluations,
+            "recordings": self.recordings,
+            "tension_iterations": self.inextensibility.iterations,
+            "inverse": tuple(self._inverse) if self._inverse else None,
+            "recent": [saved_motion(np.frombuffer(state), motion) for state, motion in self._recent],
+        }
+
+    def restore(self, saved: Saved) -> None:
+        """Go on where another equation was; see `EquationOfMotion`.
+
+        Parameters
+        ----------
+        saved : dict
+        """
+        self.evaluations, self.recordings = saved["evaluations"], saved["recordings"]
+        self.inextensibility.iterations = saved["tension_iterations"]
+        self._inverse = TensionInverse(*saved["inverse"]) if saved["inverse"] else None
+        several = self.membranes.curves > 1
+        self._recent.clear()
+        for each in saved["recent"]:
+            geometry = Geometry(self.membranes, each["state"])
+            motion = restored_motion(each, geometry, Closeness(geometry) if several else None)
+            self._recent.append((each["state"].tobytes(), motion))
 
     def conserved(self, state: Array) -> Array:
         """Return quantities of order 1 that the exact motion keeps; see `EquationOfMotion`.

@@ -28,6 +28,7 @@ from solver.membrane.tangential_velocity import add_tangential_motion
 if TYPE_CHECKING:
     from solver.forces.bending import Bending
     from solver.membrane.geometry import Geometry, Membranes
+    from solver.memory import Saved
     from solver.motion.jacobian import Jacobian
     from solver.potentials.proximity import Proximity
     from solver.potentials.viscosity_contrast import ViscosityContrast
@@ -98,6 +99,44 @@ class Motion:
         if self.restoring is not None:
             angle_rate += self.restoring
         return np.concatenate([angle_rate.ravel(), self.velocity.sum(axis=2).ravel() / points])
+
+
+_FIELDS = ("velocity", "rotation_rate", "tension", "bending", "adhesion", "restoring")
+
+
+def saved_motion(state: Array, motion: Motion) -> Saved:
+    """Return a motion as plain values (`solver.memory`).
+
+    Parameters
+    ----------
+    state : (state_size,)
+    motion : Motion
+        In this state.
+
+    Returns
+    -------
+    dict
+    """
+    return {"state": state, **{name: getattr(motion, name) for name in _FIELDS}}
+
+
+def restored_motion(saved: Saved, geometry: Geometry, closeness: Proximity | None) -> Motion:
+    """Return a motion that was saved.
+
+    Parameters
+    ----------
+    saved : dict
+        As `saved_motion` returned it.
+    geometry : Geometry
+        Of its state.
+    closeness : Proximity or None
+        Of the geometry.
+
+    Returns
+    -------
+    Motion
+    """
+    return Motion(geometry, closeness, **{name: saved[name] for name in _FIELDS})
 
 
 class AdhesionEnergy(Protocol):
@@ -217,6 +256,35 @@ class EquationOfMotion(Protocol):
         ------
         TensionNotFoundError
             If the membranes are too distorted.
+        """
+
+    def restored_jacobian(self, saved: Saved) -> Jacobian:
+        """Return a Jacobian that `jacobian` once returned.
+
+        Parameters
+        ----------
+        saved : dict
+            As `Jacobian.saved` returned it.
+
+        Returns
+        -------
+        Jacobian
+        """
+
+    def saved(self) -> Saved:
+        """Return what was kept for the next evaluations, and the counts, as plain values.
+
+        Returns
+        -------
+        dict
+        """
+
+    def restore(self, saved: Saved) -> None:
+        """Go on where another equation of the same scene was.
+
+        Parameters
+        ----------
+        saved : dict
         """
 
     def conserved(self, state: Array) -> Array:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.linalg import lapack
 
 if TYPE_CHECKING:
+    from solver.memory import Saved
     from solver.parallel import Shares
 
 Array = NDArray[np.float64]
@@ -39,6 +40,14 @@ class Jacobian(Protocol):
         Returns
         -------
         (n,) or (n, k)
+        """
+
+    def saved(self) -> Saved:
+        """Return it as plain values (`solver.memory`).
+
+        Returns
+        -------
+        dict
         """
 
     def solver(self, duration: float) -> Callable[[Array], Array]:
@@ -81,6 +90,15 @@ class DenseJacobian:
         (n,)
         """
         return np.asarray(self.matrix @ direction)
+
+    def saved(self) -> Saved:
+        """Return the matrix; see `Jacobian`.
+
+        Returns
+        -------
+        dict
+        """
+        return {"matrix": self.matrix}
 
     def solver(self, duration: float) -> Callable[[Array], Array]:
         """Factorize I − duration·J; see `Jacobian`.
@@ -137,6 +155,15 @@ class BlockDiagonal:
         result = np.empty_like(direction)
         result[self.members] = self.shares.gather((self.blocks @ parts[:, :, None])[:, :, 0])
         return result
+
+    def saved(self) -> Saved:
+        """Return the blocks of all ranks; see `Jacobian`.
+
+        Returns
+        -------
+        dict
+        """
+        return {"blocks": self.shares.gather(self.blocks)}
 
     def solver(self, duration: float) -> Callable[[Array], Array]:
         """Invert the blocks of I − duration·J; see `Jacobian`.  Calls of the result are collective.

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from solver.forces.summed_tension import Preconditioner, SummedInextensibility
 from solver.forces.tension import TensionInverse, TensionNotFoundError
 from solver.membrane.geometry import Geometry, Membranes
-from solver.motion.equation import Motion, conserved_quantities
+from solver.motion.equation import Motion, conserved_quantities, restored_motion, saved_motion
 from solver.motion.jacobian import BlockDiagonal
 from solver.potentials.neighbors import Neighbors
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from solver.forces.bending import Bending
     from solver.forces.coarsened_adhesion import CoarsenedAdhesion
     from solver.membrane.restoring import Restoring
+    from solver.memory import Saved
     from solver.motion.dense import DenseEquation
     from solver.parallel import Parallel, Shares
     from solver.potentials.summed_single_layer import SummedSingleLayer
@@ -153,9 +154,61 @@ class SummedEquation:
         self._last = self._last._replace(
             preconditioner=self._precondition(motion.geometry, shares, linearize)
         )
+        return BlockDiagonal(blocks, self._members, shares)
+
+    @property
+    def _members(self) -> NDArray[np.int64]:
+        """The elements of the state that belong to each vesicle, (M, N + 2)."""
+        count, points = self.membranes.count, self.membranes.points
         angles = np.arange(count * points).reshape(count, points)
         centers = count * points + np.arange(2 * count).reshape(2, count).T
-        return BlockDiagonal(blocks, np.concatenate([angles, centers], axis=1), shares)
+        return np.concatenate([angles, centers], axis=1)
+
+    def restored_jacobian(self, saved: Saved) -> BlockDiagonal:
+        """Return a Jacobian that `jacobian` once returned; see `EquationOfMotion`.
+
+        Parameters
+        ----------
+        saved : dict
+
+        Returns
+        -------
+        BlockDiagonal
+        """
+        shares = self.parallel.divide(self.membranes.count)
+        return BlockDiagonal(saved["blocks"][shares.own], self._members, shares)
+
+    def saved(self) -> Saved:
+        """Return what was kept for the next evaluations; see `EquationOfMotion`.
+
+        Returns
+        -------
+        dict
+        """
+        last = self._last
+        return {
+            "evaluations": self.evaluations,
+            "recordings": self.recordings,
+            "tension_iterations": self.inextensibility.iterations,
+            "last": saved_motion(last.state, last.motion) if last else None,
+            "preconditioner": tuple(last.preconditioner) if last else None,
+        }
+
+    def restore(self, saved: Saved) -> None:
+        """Go on where another equation was; see `EquationOfMotion`.
+
+        Parameters
+        ----------
+        saved : dict
+        """
+        self.evaluations, self.recordings = saved["evaluations"], saved["recordings"]
+        self.inextensibility.iterations = saved["tension_iterations"]
+        self._last = None
+        if saved["last"]:
+            geometry = Geometry(self.membranes, saved["last"]["state"])
+            motion = restored_motion(saved["last"], geometry, Neighbors(geometry, self.reach))
+            preconditioner = Preconditioner(*saved["preconditioner"])
+            self._last = _Evaluation(saved["last"]["state"], motion, preconditioner)
 
     def conserved(self, state: Array) -> Array:
         """Return quantities of order 1 that the exact motion keeps; see `EquationOfMotion`.

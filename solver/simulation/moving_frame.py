@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from solver.integrators.integrator import StepFailedError
+from solver.memory import Remembering
 
 if TYPE_CHECKING:
     from solver.flows import ImposedFlow
@@ -31,7 +32,7 @@ Array = NDArray[np.float64]
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)  # within a step, as accurate as any integrator
 
 
-class MovingFrame:
+class MovingFrame(Remembering):
     """Follows the mean of the centers in the fluid.
 
     Parameters
@@ -48,11 +49,13 @@ class MovingFrame:
     scene : Scene
     """
 
+    memory = ("_reached",)  # a step is not known before the next one
+
     def __init__(self, flow: ImposedFlow, scene: Scene, start: Array) -> None:
         self.scene = scene
         self._gradient = np.array(flow.velocity_gradient(np.zeros((2, 1)))[:, :, 0])
-        self._mean = start
-        self._origin = start
+        self._mean = start  # where the last step began
+        self._reached = start, start  # the mean and the origin where it ended
         self._step: Step | None = None
         self._membranes: Membranes | None = None
 
@@ -99,11 +102,11 @@ class MovingFrame:
         StepFailedError
             If the place of the frame is no finite number any more.
         """
-        if self._step:
-            self._mean, self._origin = self._at(self._step.end)
+        self._mean, _ = self._reached
         self._step, self._membranes = step, membranes
         with np.errstate(over="ignore", invalid="ignore"):
-            if not np.all(np.isfinite(self._at(step.end))):
+            self._reached = self._at(step.end)
+            if not np.all(np.isfinite(self._reached)):
                 raise StepFailedError(
                     f"at time {step.end:g} the flow has carried the vesicles beyond all numbers"
                 )
@@ -126,7 +129,7 @@ class MovingFrame:
         """Return the mean of the centers, and the origin of the frame, in the fluid."""
         step = self._step
         if step is None:
-            return self._mean, self._origin
+            return self._reached
         elapsed = time - step.start
         mean = expm(self._gradient * elapsed) @ self._mean
         if self._membranes and self._membranes.multiplicity == 1:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from solver.integrators import InitialValueProblem, Integrator, Step, integrator
 
 if TYPE_CHECKING:
     from solver.membrane.geometry import Membranes
+    from solver.memory import Saved
     from solver.motion.equation import EquationOfMotion
     from solver.scene import Scene
 
@@ -52,6 +53,7 @@ class Segment:
         self.equation = equation
         self._scene = scene
         self._before = before
+        self._problem: InitialValueProblem | None = None
         self._integrator: Integrator | None = None
 
     @property
@@ -72,8 +74,50 @@ class Segment:
         error : (state_size,) or None
             Estimated error of the state; None for an exact one.
         """
-        problem = InitialValueProblem(self.equation, state, time, latest, error)
+        self._problem = problem = InitialValueProblem(self.equation, state, time, latest, error)
         self._integrator = integrator_for(problem, self._scene.numerics, len(self._scene.vesicles))
+
+    def saved(self) -> Saved:
+        """Return what decides the steps to come; `begin` comes before.
+
+        Returns
+        -------
+        dict
+            See `solver.memory`.
+        """
+        problem, integrator = self._problem, self._integrator
+        assert problem
+        assert integrator
+        return {
+            "points": self.membranes.points,
+            "before": tuple(self._before),
+            "begun": (problem.start, problem.state.copy(), problem.end, problem.error),
+            "integrator": integrator.saved(),
+            "equation": self.equation.saved(),
+        }
+
+    @classmethod
+    def restored(cls, saved: Saved, equation: EquationOfMotion, scene: Scene) -> Self:
+        """Go on with a part that was saved.
+
+        Parameters
+        ----------
+        saved : dict
+        equation : EquationOfMotion
+            With its number of points.
+        scene : Scene
+
+        Returns
+        -------
+        Segment
+        """
+        segment = cls(equation, scene, SegmentWork(*saved["before"]))
+        # Where it began the integrator is known to find what it needs; it forgets that at once.
+        segment.begin(*saved["begun"])
+        assert segment._integrator
+        segment._integrator.restore(saved["integrator"])
+        equation.restore(saved["equation"])
+        return segment
 
     def step(self) -> Step:
         """Take one step; `begin` comes before.

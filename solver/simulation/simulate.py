@@ -6,7 +6,7 @@ import time as clock
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,7 @@ from solver.steady_states.rest import HiddenInstabilityError, rest_near
 from solver.steady_states.steady_equations import SteadyEquations
 
 if TYPE_CHECKING:
+    from solver.memory import Saved
     from solver.scene import Scene
     from solver.steady_states.rest import Rest
 
@@ -82,34 +83,204 @@ def simulate(
         If ``should_stop`` has returned true.
     """
     with one_blas_thread():
-        began = clock.perf_counter()
-        frame = MovingFrame.of_scene(scene)
-        within = frame.scene if frame else scene
-        resolution = resolution_of(within)
-        start = _start(within, resolution.points, parallel, should_stop)
+        simulation = Simulation(scene, parallel=parallel)
         should_stop = first_rank_asks(parallel, should_stop)
-        require_time = _wall_limit(scene, parallel, began)
-        equation_of = partial(equation_of_motion, parallel=parallel)
+        while not simulation.done:
+            simulation.step()
+            if should_stop and should_stop():
+                raise Cancelled
+            if on_progress and not simulation.relaxes:
+                on_progress(simulation.time, scene.latest_time)
+        return simulation.run()
+
+
+class Simulation:
+    """A scene that is run step by step, and may be saved in between.
+
+    A simulation that is restored goes on to the same bits as one that was never interrupted, on as many
+    ranks; on another number to round-off.
+
+    Collective: all ranks of ``parallel`` make it with the same scene and call the same methods.
+
+    Parameters
+    ----------
+    scene : Scene
+    parallel : Parallel
+        The ranks that compute the run together.
+    """
+
+    def __init__(self, scene: Scene, *, parallel: Parallel = SERIAL) -> None:
+        self._relaxation: Simulation | None = None
+        self._prepare(scene, parallel, 0.0)
+        with one_blas_thread():
+            points = self._resolution.points
+            if self._within.start.relaxed:
+                self._relaxation = Simulation(_at_rest(self._within), parallel=parallel)
+            else:
+                self._begin(_Start(points, initial_ellipses(with_points(self._within, points))))
+
+    def _prepare(self, scene: Scene, parallel: Parallel, elapsed: float) -> None:
+        """Set what the scene alone decides, and the wall time that is used up."""
+        self._scene, self._parallel = scene, parallel
+        self._began = clock.perf_counter() - elapsed
+        self._frame = MovingFrame.of_scene(scene)
+        self._within = self._frame.scene if self._frame else scene
+        self._resolution = resolution_of(self._within)
+        self._limit = _wall_limit(scene, parallel, self._began)
+        self._loop: TimeLoop | None = None
+        self._start_points = self._resolution.points
+        self._start_evaluations = 0
+        self._failure: str | None = None
+
+    @property
+    def time(self) -> float:
+        """The time reached; 0 while the start relaxes."""
+        return self._loop.time if self._loop else 0.0
+
+    @property
+    def relaxes(self) -> bool:
+        """Whether steps still lead to the relaxed start."""
+        return self._loop is None
+
+    @property
+    def done(self) -> bool:
+        """Whether the outcome is decided."""
+        return self._failure is not None or (self._loop is not None and self._loop.done)
+
+    def step(self) -> None:
+        """Take one step, of the relaxation of the start as long as that lasts.
+
+        A step may be rejected: then the next one is taken with more points.  A numerical failure ends the
+        run.
+
+        Raises
+        ------
+        ValueError
+            If the run is done.
+        """
+        if self.done:
+            raise ValueError("the run is done: no step is left")
+        with one_blas_thread():
+            if self._loop is None:
+                self._relax()
+                return
+            try:
+                if self._loop.advance():
+                    self._limit(self._loop.time)
+                if self._loop.done:
+                    self._loop.recorder.finish(self._loop.time, self._loop.state)
+            except _NUMERICAL_FAILURES as error:
+                self._failure = _failure(self._loop, error)
+
+    def run(self) -> Run:
+        """Return the run.
+
+        Returns
+        -------
+        Run
+
+        Raises
+        ------
+        ValueError
+            If it is not done.
+        """
+        if self._loop is None or not self.done:
+            raise ValueError(f"the run is at time {self.time:g} and not done: take further steps")
+        with one_blas_thread():
+            return _finished(self._scene, self._loop, self._failure, self._start_evaluations, self._elapsed)
+
+    def saved(self) -> Saved:
+        """Return everything that decides the steps to come.
+
+        Returns
+        -------
+        dict
+            Numbers, strings, None, arrays, and tuples, lists and dictionaries of such.
+
+        Raises
+        ------
+        ValueError
+            If the run is done.
+        """
+        if self.done:
+            raise ValueError("the run is done: take its result")
+        with one_blas_thread():
+            return {
+                "wall_seconds": self._elapsed,
+                "relaxation": self._relaxation.saved() if self._relaxation else None,
+                "start_points": self._start_points,
+                "start_evaluations": self._start_evaluations,
+                "loop": self._loop.saved() if self._loop else None,
+            }
+
+    @classmethod
+    def restored(cls, scene: Scene, saved: Saved, *, parallel: Parallel = SERIAL) -> Self:
+        """Go on with a simulation that was saved.
+
+        Parameters
+        ----------
+        scene : Scene
+            The same.
+        saved : dict
+            As `saved` returned it.
+        parallel : Parallel
+            The ranks that go on together.
+
+        Returns
+        -------
+        Simulation
+        """
+        simulation = cls.__new__(cls)
+        simulation._relaxation = None
+        with one_blas_thread():
+            simulation._prepare(scene, parallel, saved["wall_seconds"])
+            if saved["relaxation"]:
+                relaxing = _at_rest(simulation._within)
+                simulation._relaxation = cls.restored(relaxing, saved["relaxation"], parallel=parallel)
+                return simulation
+            simulation._start_points = saved["start_points"]
+            simulation._start_evaluations = saved["start_evaluations"]
+            placed = with_points(simulation._within, simulation._start_points)
+            simulation._loop = simulation._time_loop(placed, initial_ellipses(placed))
+            simulation._loop.restore(saved["loop"])
+        return simulation
+
+    @property
+    def _elapsed(self) -> float:
+        return clock.perf_counter() - self._began
+
+    def _relax(self) -> None:
+        """Take a step of the relaxation; after the last one begin the run."""
+        assert self._relaxation
+        if not self._relaxation.done:
+            self._relaxation.step()
+        if self._relaxation.done:
+            start = _relaxed_start(self._within, self._resolution.points, self._relaxation.run())
+            self._relaxation = None
+            self._begin(start)
+
+    def _begin(self, start: _Start) -> None:
+        """Record the start, and prepare the first step unless there is none."""
+        self._start_points, self._start_evaluations = start.points, start.evaluations
+        self._loop = loop = self._time_loop(with_points(self._within, start.points), start.state)
+        try:
+            loop.recorder.record(loop.time, loop.state)
+            if start.failure:
+                raise StepFailedError(start.failure)
+            if loop.recorder.spatial_error > HOPELESS_SPATIAL:
+                raise UnresolvedError("the run was not begun")
+            loop.begin()
+        except _NUMERICAL_FAILURES as error:
+            self._failure = _failure(loop, error)
+
+    def _time_loop(self, placed: Scene, state: Array) -> TimeLoop:
+        """Return the loop from a state on."""
+        scene = self._scene
+        equation_of = partial(equation_of_motion, parallel=self._parallel)
         # A circle has no other shape near: there is nothing to examine.
         has_circle = any(vesicle.is_circle for vesicle in scene.vesicles)
-        examine = None if scene.many or has_circle else partial(_examined, within)
-        placed = with_points(within, start.points)
-        loop = TimeLoop(placed, start.state, resolution, equation_of, parallel, frame, examine)
-        failure = None
-        try:
-            _begin(loop, start)
-            while not loop.done:
-                if not loop.advance():
-                    continue
-                if should_stop and should_stop():
-                    raise Cancelled
-                require_time(loop.time)
-                if on_progress:
-                    on_progress(loop.time, scene.latest_time)
-            loop.recorder.finish(loop.time, loop.state)
-        except _NUMERICAL_FAILURES as error:
-            failure = _failure(loop, error)
-        return _finished(scene, loop, failure, start.evaluations, clock.perf_counter() - began)
+        examine = None if scene.many or has_circle else partial(_examined, self._within)
+        return TimeLoop(placed, state, self._resolution, equation_of, self._parallel, self._frame, examine)
 
 
 @dataclass(frozen=True)
@@ -120,16 +291,6 @@ class _Start:
     state: Array
     evaluations: int = 0
     failure: str | None = None
-
-
-def _begin(loop: TimeLoop, start: _Start) -> None:
-    """Record the start, and prepare the first step unless there is none."""
-    loop.recorder.record(loop.time, loop.state)
-    if start.failure:
-        raise StepFailedError(start.failure)
-    if loop.recorder.spatial_error > HOPELESS_SPATIAL:
-        raise UnresolvedError("the run was not begun")
-    loop.begin()
 
 
 def _wall_limit(scene: Scene, parallel: Parallel, began: float) -> Callable[[float], None]:
@@ -146,12 +307,9 @@ def _wall_limit(scene: Scene, parallel: Parallel, began: float) -> Callable[[flo
     return require_time
 
 
-def _start(scene: Scene, points: int, parallel: Parallel, should_stop: Callable[[], bool] | None) -> _Start:
-    """Return where a run begins that needs this number of points for the vesicles as they are placed."""
-    placed = initial_ellipses(with_points(scene, points))
-    if not scene.start.relaxed:
-        return _Start(points, placed)
-    at_rest = scene.model_copy(
+def _at_rest(scene: Scene) -> Scene:
+    """Return the scene that relaxes to the start of a scene."""
+    return scene.model_copy(
         update={
             "flow": None,
             "start": scene.start.model_copy(update={"relaxed": False}),
@@ -159,10 +317,14 @@ def _start(scene: Scene, points: int, parallel: Parallel, should_stop: Callable[
             "output": scene.output.model_copy(update=_RELAXATION_OUTPUT),
         }
     )
-    relaxed = simulate(at_rest, parallel=parallel, should_stop=should_stop)
+
+
+def _relaxed_start(scene: Scene, points: int, relaxed: Run) -> _Start:
+    """Return where a run begins that needs this number of points for the vesicles as they are placed."""
     evaluations = relaxed.work.rhs_evaluations
     if relaxed.outcome is not Outcome.EQUILIBRIUM:
         reason = relaxed.failure or f"{relaxed.outcome} at time {relaxed.time:g}"
+        placed = initial_ellipses(with_points(scene, points))
         return _Start(points, placed, evaluations, f"start: the pair did not relax ({reason})")
     frames = relaxed.frames
     points = frames.tangent_angle.shape[-1]

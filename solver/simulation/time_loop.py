@@ -23,6 +23,7 @@ from solver.analysis.run import Outcome
 from solver.analysis.viscosity_history import ViscosityHistory
 from solver.integrators import Step, StepFailedError
 from solver.membrane.resampling import resampled_state
+from solver.memory import Remembering, Saved
 from solver.parallel import Parallel, require_agreement
 from solver.simulation.resolution import Resolution, with_points
 from solver.simulation.segment import Segment, SegmentWork
@@ -37,7 +38,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-class TimeLoop:
+class TimeLoop(Remembering):
     """Advances a scene step by step.
 
     Parameters
@@ -84,6 +85,23 @@ class TimeLoop:
     answer_errors : AnswerErrors
     """
 
+    memory = (
+        "time",
+        "state",
+        "error",
+        "steps",
+        "rejected_steps",
+        "smallest_step",
+        "temporal_error",
+        "perturbations",
+        "_line_of_centers",
+        "_long_axis",
+        "viscosities",
+        "recorder",
+        "answer_errors",
+        "_frame",
+    )
+
     def __init__(
         self,
         scene: Scene,
@@ -125,6 +143,35 @@ class TimeLoop:
         self.perturbations: list[float] = []
         self.error: Array | None = None
         self.answer_errors = AnswerErrors(self.tracker)
+
+    def saved(self) -> Saved:
+        """Return everything that decides what follows; `begin` comes before.  Collective.
+
+        Returns
+        -------
+        dict
+            See `solver.memory`.
+        """
+        return {
+            **super().saved(),
+            "outcome": str(self.outcome),
+            "criteria": [criterion.saved() for criterion in self._criteria],
+            "segment": self.segment.saved(),
+        }
+
+    def restore(self, saved: Saved) -> None:
+        """Go on where another loop over the same scene was.  Collective.
+
+        Parameters
+        ----------
+        saved : dict
+        """
+        self._take_segment(saved["segment"]["points"])
+        super().restore(saved)
+        self.outcome = Outcome(saved["outcome"])
+        for criterion, its_memory in zip(self._criteria, saved["criteria"], strict=True):
+            criterion.restore(its_memory)
+        self.segment = Segment.restored(saved["segment"], self.segment.equation, self._scene)
 
     @property
     def done(self) -> bool:

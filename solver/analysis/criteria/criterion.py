@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.memory import Remembering, Saved, plain
+
 if TYPE_CHECKING:
     from solver.analysis.line_of_centers import LineOfCenters
     from solver.analysis.revolutions import LongAxisTracker
@@ -54,8 +56,10 @@ class History:
     examine: Callable[[], Rest] | None = None
 
 
-class Criterion(ABC):
+class Criterion(Remembering, ABC):
     """Decides runs of the scenes that it applies to.
+
+    All attributes but the scene are its memory, and plain values (`solver.memory`).
 
     Parameters
     ----------
@@ -72,6 +76,25 @@ class Criterion(ABC):
         self._scene = scene
         self.departure: Array | None = None
 
+    def saved(self) -> Saved:
+        """Return all attributes but the scene; see `Remembering`.
+
+        Returns
+        -------
+        dict
+        """
+        return {name: plain(value, name) for name, value in vars(self).items() if name != "_scene"}
+
+    def restore(self, saved: Saved) -> None:
+        """Remember what another criterion of the kind did; see `Remembering`.
+
+        Parameters
+        ----------
+        saved : dict
+        """
+        for name, value in saved.items():
+            setattr(self, name, plain(value, name))
+
     @classmethod
     @abstractmethod
     def applies_to(cls, scene: Scene) -> bool:
@@ -86,7 +109,7 @@ class Criterion(ABC):
         bool
         """
 
-    def begin(self, history: History) -> None:  # noqa: B027  most criteria need not know the start
+    def begin(self, history: History) -> None:
         """Take note of a state with which steps begin: the start, or one that was resampled or perturbed.
 
         Parameters
