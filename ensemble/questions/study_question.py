@@ -160,15 +160,18 @@ class StudyQuestion(Question[Study]):
         Returns
         -------
         str
-            How many points have converged, and what became of each of the others.
+            How many points have converged, what became of each of the others, and where it is known that the
+            answer is not the only one.
         """
         points = json_document["boundary"]
-        others = [point for point in points if point["status"] != "converged"]
-        return f"{len(points) - len(others)} of {len(points)} points converged" + "".join(
-            f"; {name} {value:g}: {point['status']}"
-            for point in others
+        remarks = [
+            f"{name} {value:g}: {remark}"
+            for point in points
+            for remark in _remarks(point)
             for name, value in point["parameters"].items()
-        )
+        ]
+        converged = sum(point["status"] == "converged" for point in points)
+        return "; ".join((f"{converged} of {len(points)} points converged", *remarks))
 
     @classmethod
     def stored(cls, store: Store, name: str) -> StoredAnswer | None:
@@ -241,6 +244,14 @@ def _columns() -> tuple[ListColumn, ...]:
         ListColumn("certified", certified),
         ListColumn("updated", lambda boundary: boundary["updated"][:19].replace("T", " ")),
     )
+
+
+def _remarks(point: Mapping[str, Any]) -> Iterator[str]:
+    """Yield what a reader must know of a point of a boundary, besides its bracket."""
+    if point["status"] != "converged":
+        yield point["status"]
+    if point["incidental_changes"]:
+        yield "other runs show further changes of the outcome"
 
 
 @dataclass(frozen=True)

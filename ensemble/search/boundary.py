@@ -93,8 +93,11 @@ class BoundaryPoint(BaseModel):
     status : str
         What the search, or the certification, has come to.
     changes : list of OutcomeChange
-        All changes of the outcome that were found within the limits, ascending: those of the bracket and,
-        where there are several, the others.
+        All changes of the outcome that the search has found within the limits, ascending: those of the
+        bracket and, where there are several, the others.
+    incidental_changes : list of OutcomeChange
+        Further changes that other runs show, made ahead or for other studies.  Which of those there are
+        depends on circumstances such as the number of ranks, so the status does not rest on them.
     scanned : Scanned or None
         How far the search has looked beside them; None until it has, or if it does not.
     confirmed : list of Confirmed
@@ -116,6 +119,7 @@ class BoundaryPoint(BaseModel):
     outcomes: tuple[str | None, str | None]
     status: str
     changes: list[OutcomeChange] = []
+    incidental_changes: list[OutcomeChange] = []
     scanned: Scanned | None = None
     confirmed: list[Confirmed] = []
     certified: bool
@@ -124,11 +128,11 @@ class BoundaryPoint(BaseModel):
 
     @property
     def other_changes(self) -> list[OutcomeChange]:
-        """The changes of the outcome that are not within the bracket."""
+        """The changes of the outcome that are not within the bracket, ascending."""
         low, high = self.bracket
         return [
             change
-            for change in self.changes
+            for change in sorted((*self.changes, *self.incidental_changes), key=lambda each: each.bracket)
             if (low is not None and change.bracket[0] < low)
             or (high is not None and change.bracket[1] > high)
         ]

@@ -376,6 +376,11 @@ class CriticalValueSearch(GridSearch):
         low, high = self.bracket
         return () if low is None or high is None else ((low, high),)
 
+    @property
+    def incidental_changes(self) -> tuple[tuple[float, float], ...]:
+        """None: every answer is one that this search rests on."""
+        return ()
+
     def _prior_of(self, guess: tuple[float, float]) -> _Prior:
         first, last = self._guessed(guess)
         return _CauchyPrior(center=(first + last) / 2, half_width=max((last - first) / 2, 1))

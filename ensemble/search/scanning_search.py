@@ -13,7 +13,8 @@ to high: above it everything that was looked at is high.
 Which values these are follows from the sides of such values alone.  So the answer is the same to the last bit
 whatever the guess, the limits (if they contain every change), the number of workers and the order of answers,
 and whatever the outcomes are.  Other answers, of runs made ahead or for other studies, have no influence on
-it.  But none is passed over: where one contradicts, the search brackets the changes beside it too.
+it.  But none is passed over: where one contradicts, the search brackets the changes beside it too, and gives
+them as `incidental_changes`.
 """
 
 from __future__ import annotations
@@ -224,7 +225,7 @@ class ScanningSearch(GridSearch):
         """What the search has come to."""
         if self._answer is None or self._bisections:
             return SearchStatus.SEARCHING
-        if len(self._changes()) > 1:
+        if len(self._differing(self._looked_at)) > 1:
             return SearchStatus.NON_MONOTONE
         low, high = self._answer
         if high - low == 1 and not (low in self._indices and high in self._indices):
@@ -238,12 +239,15 @@ class ScanningSearch(GridSearch):
 
     @property
     def changes(self) -> tuple[tuple[float, float], ...]:
-        """All values within the limits between which the side changes, ascending; empty until done."""
-        return tuple(
-            (self._grid.value(low), self._grid.value(high))
-            for low, high in (self._changes() if self.done else ())
-            if low in self._indices and high in self._indices
-        )
+        """The values within the limits between which the side changes, ascending; empty until done."""
+        return self._within_limits(self._differing(self._looked_at))
+
+    @property
+    def incidental_changes(self) -> tuple[tuple[float, float], ...]:
+        """Further changes, that answers beside those of this search show, ascending; empty until done."""
+        own = set(self._differing(self._looked_at))
+        seen = self._differing(self._looked_at | self._sides.keys())
+        return self._within_limits(change for change in seen if change not in own)
 
     @property
     def ends_of_changes(self) -> frozenset[float]:
@@ -308,8 +312,13 @@ class ScanningSearch(GridSearch):
             if self._side(low) is not self._side(high)
         ]
 
-    def _changes(self) -> list[tuple[int, int]]:
-        return self._differing(self._looked_at | self._sides.keys())
+    def _within_limits(self, changes: Iterable[tuple[int, int]]) -> tuple[tuple[float, float], ...]:
+        """Return the values of changes that lie within the limits; none until done."""
+        return tuple(
+            (self._grid.value(low), self._grid.value(high))
+            for low, high in (changes if self.done else ())
+            if low in self._indices and high in self._indices
+        )
 
     def _highest_rise(self, indices: Iterable[int]) -> tuple[int, int]:
         # There is one: the least index lies below the limits, hence low, and the greatest above, hence high.

@@ -185,10 +185,8 @@ class StudyPoint:
             bracket=bracket,
             outcomes=outcomes,
             status=status,
-            changes=[
-                OutcomeChange.model_validate({"bracket": change, "outcomes": self._outcomes(change)})
-                for change in search.changes
-            ],
+            changes=list(map(self._change, search.changes)),
+            incidental_changes=list(map(self._change, search.incidental_changes)),
             scanned=_scanned(search),
             confirmed=[
                 Confirmed(
@@ -256,6 +254,9 @@ class StudyPoint:
     def _at_finer_numerics(self, search: SomeValueSearch) -> PointSearch[SomeValueSearch]:
         side = partial(side_of, self._study)
         return PointSearch(search, self._sweep_value, self._finer_scene, side, self._known)
+
+    def _change(self, ends: tuple[float, float]) -> OutcomeChange:
+        return OutcomeChange.model_validate({"bracket": ends, "outcomes": self._outcomes(ends)})
 
     def _outcomes(self, ends: tuple[float | None, float | None]) -> tuple[str | None, str | None]:
         """Return the outcomes that count at two values; None for an end that is unknown."""

@@ -179,12 +179,12 @@ class Recorder(Remembering):
     def _assess_resolution(self, time: float, state: Array, motion: Motion) -> None:
         """Note how well the points resolve the shapes, the waists, and adhesion at the smallest gap."""
         tails, waists = shape_tails(self._membranes, state), waist_error(motion.geometry)
-        errors = [float(tails.max()), float(waists.max())]
+        of_positions = float(spatial_error(tails, self._shape_rates * time).max())
+        errors = [of_positions, float(waists.max())]
         adhesion = self._equation.adhesion
         if adhesion and motion.closeness:
             errors.append(adhesion.sum_error(motion.closeness))
         self.spatial_error = max(self.spatial_error, *errors)
-        of_positions = float(spatial_error(tails, self._shape_rates * time).max())
         self.spatial_position_error = max(self.spatial_position_error, of_positions)
 
     def _keep(self, time: float, state: Array, motion: Motion) -> None:

@@ -93,7 +93,7 @@ class Errors:
     temporal : float
         Sum over the steps of the estimated local error of the state.
     spatial : float
-        The largest of: the amplitude (radians) of the last third of the tangent angle's spectrum; the
+        The largest of: the error of positions that the points leave, by `solver.analysis.spatial_error`; the
         relative error of the single layer across a vesicle's waist; that of adhesion at the smallest gap.
         Beyond `LARGEST_SPATIAL` the points do not resolve the scene.
     global_ : float or None

@@ -12,7 +12,7 @@ from solver.analysis import averages
 from solver.analysis.criteria.steady import outcome_at_rest
 from solver.analysis.diagnostics import measures
 from solver.analysis.run import Energy, Outcome, Viscosity
-from solver.analysis.spatial_error import shape_tails
+from solver.analysis.spatial_error import shape_tails, spatial_error
 from solver.membrane.symmetry import has_images, independent_vesicles
 from solver.motion.terms import accurate_equation
 from solver.steady_states.continuation import Continuation, Limits
@@ -66,7 +66,7 @@ class SteadyState:
     viscosity : Viscosity or None
     energy : Energy
     spatial_error : float
-        Amplitude (radians) of the last third of the tangent angles' spectrum.
+        Of positions, see `solver.analysis.spatial_error`.
     shapes : Shapes
     """
 
@@ -201,6 +201,7 @@ def _described(scene: Scene, equations: SteadyEquations, state: Array) -> Steady
     perturbations = Perturbations.of(equations, state)
     motion = equation.motion(state)
     series = {name: np.array([measure(motion)]) for name, measure in measures(scene, equation).items()}
+    tails = shape_tails(membranes, state)
     shapes = Shapes(membranes.tangent_angle(state), membranes.center(state))
     if len(scene.vesicles) == 2:
         offset = shapes.center[1] - shapes.center[0]
@@ -217,6 +218,6 @@ def _described(scene: Scene, equations: SteadyEquations, state: Array) -> Steady
             bending=float(series["bending_energy"][0]),
             adhesion=float(series["adhesion_energy"][0]) if "adhesion_energy" in series else None,
         ),
-        spatial_error=float(shape_tails(membranes, state).max()),
+        spatial_error=float(spatial_error(tails, age=np.full_like(tails, np.inf)).max()),
         shapes=shapes,
     )

@@ -25,9 +25,9 @@ class StabilityVerdict(StrEnum):
 CRITERIA: Mapping[StabilityVerdict, str] = {
     StabilityVerdict.FAILED: "the run gave up, for the reason stated, or raised an error",
     StabilityVerdict.SPACE: (
-        f"the spatial error exceeds {LARGEST_SPATIAL:g}: that is the amplitude (rad) of the last third of "
-        "the tangent angle's spectrum, or the relative error across a vesicle's waist or of adhesion at the "
-        "smallest gap, whichever is largest"
+        f"the spatial error exceeds {LARGEST_SPATIAL:g}: that is the error of positions that the points "
+        "leave, or the relative error across a vesicle's waist or of adhesion at the smallest gap, whichever "
+        "is largest"
     ),
     StabilityVerdict.TIME: (
         f"resolved in space, but area or closure drift by more than {LARGEST_DRIFT:g}, or the energy of a "

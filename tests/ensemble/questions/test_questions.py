@@ -104,10 +104,14 @@ def test_sizes_are_checked_whatever_the_document_is(kind: str, document: Any) ->
 
 def test_summaries_of_answers() -> None:
     points = [
-        {"status": "converged", "parameters": {"flow.rate": 0.5}},
-        {"status": "unbracketed", "parameters": {"flow.rate": 1.0}},
+        {"status": "converged", "parameters": {"flow.rate": 0.5}, "incidental_changes": []},
+        {"status": "unbracketed", "parameters": {"flow.rate": 1.0}, "incidental_changes": []},
+        {"status": "converged", "parameters": {"flow.rate": 2.0}, "incidental_changes": [{}, {}]},
     ]
     study, scene = kind_named("study"), kind_named("scene")
-    assert study.summary({"boundary": points}) == "1 of 2 points converged; flow.rate 1: unbracketed"
+    assert study.summary({"boundary": points}) == (
+        "2 of 3 points converged; flow.rate 1: unbracketed; "
+        "flow.rate 2: other runs show further changes of the outcome"
+    )
     assert scene.summary({"outcome": "bound", "failure": None}) == "bound"
     assert scene.summary({"outcome": "failed", "failure": "too distorted"}) == "too distorted"

@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from solver import Outcome, Run, Scene
-from solver.analysis.run import Frames
+from solver.analysis.run import LARGEST_SPATIAL, Frames
 from solver.membrane.curve import positions
 from solver.membrane.geometry import Membranes
 from solver.motion import terms
@@ -285,9 +285,11 @@ def test_what_no_number_resolves_fails_with_the_reason(monkeypatch: pytest.Monke
             return None
 
     monkeypatch.setattr(simulate_module, "resolution_of", lambda scene: Refusing(32, {}))
-    run = simulate(fixed(shear_pair(1.5), 32))
+    run = simulate(fixed(strongly_adhering(100.0, 2.0), 32))
     assert run.outcome is Outcome.FAILED
-    assert run.failure == "too close (32 points do not resolve the scene: spatial error 3.2e-03)"
+    assert run.error.spatial > LARGEST_SPATIAL
+    reason = f"32 points do not resolve the scene: spatial error {run.error.spatial:.1e}"
+    assert run.failure == f"too close ({reason})"
     assert 0 < run.time <= 0.5
 
 
