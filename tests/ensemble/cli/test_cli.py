@@ -53,6 +53,7 @@ POINT_FIELDS = {
     "outcomes",
     "status",
     "changes",
+    "incidental_changes",
     "scanned",
     "confirmed",
     "certified",
