@@ -29,7 +29,9 @@ def arguments(contrast: float, store: Path, *changes: str) -> list[str]:
 def point_of(result: CompletedProcess[str]) -> dict[str, Any]:
     assert result.stdout, result.stderr
     (point,) = json.loads(result.stdout)["boundary"]
-    return {name: value for name, value in point.items() if name not in ("runs", "scanned")}
+    # One of the runs that two ranks make ahead may lie in a window, and limits cut off values of the scan.
+    circumstantial = ("runs", "scanned", "incidental_changes")
+    return {name: value for name, value in point.items() if name not in circumstantial}
 
 
 @pytest.mark.long
@@ -50,14 +52,10 @@ def test_guesses_limits_and_ranks_do_not_move_a_bracket_among_windows(
         ["search.guesses=[{at = 1.0, bracket = [0.5, 0.6]}]", "search.limits=[0.02, 10.0]"],
     ):
         found = point_of(ensemble(*arguments(contrast, alone, *changes)))
-        assert found["bracket"] == expected["bracket"]
-        assert found["confirmed"] == expected["confirmed"]
+        assert found == expected
     other_guess = "search.guesses=[{at = 1.0, bracket = [0.15, 0.2]}]"
     found = point_of(launcher.run(2, [*ENSEMBLE, *arguments(contrast, together, other_guess)]))
-    # One of the runs that two ranks make ahead may lie in a window, which then is listed too.
-    assert found["bracket"] == expected["bracket"]
-    assert found["confirmed"] == expected["confirmed"]
-    assert expected["changes"][-1] == found["changes"][-1]
+    assert found == expected
 
 
 @pytest.mark.long
