@@ -57,8 +57,8 @@ def check_lines(console: Console) -> Iterator[Callable[[int, int], None]]:
 
     def show(verified: int, total: int) -> None:
         fraction = min(verified / max(total, 1), 1.0)
-        line = ProgressLine(fraction=fraction, message=_text(verified, total), reached=verified)
-        console.print(line.model_dump_json(), soft_wrap=True, highlight=False, markup=False)
+        message = _text(verified, total)
+        ProgressLine(fraction=fraction, message=message, reached=verified).print_on(console)
 
     yield _now_and_then(show, SECONDS)
 

@@ -65,5 +65,6 @@ class _Lines(logging.Handler):
         if self._functions > 1:
             text += f": {self._functions} functions in {now - self._begin:.0f} s so far"
         if self._for_program:
-            text = ProgressLine(fraction=0.0, message=text, reached=0.0).model_dump_json()
-        self._console.print(text, soft_wrap=True, highlight=False, markup=False)
+            ProgressLine(fraction=0.0, message=text, reached=0.0).print_on(self._console)
+        else:
+            self._console.print(text, soft_wrap=True, highlight=False, markup=False)

@@ -47,7 +47,9 @@ def job_lines(console: Console) -> Iterator[Callable[[JobProgress[Any]], None]]:
     def show(progress: JobProgress[Any]) -> None:
         elapsed, left = progress.elapsed, progress.seconds_left
         fraction = 0.0 if left is None else elapsed / (elapsed + left)
-        _print_line(console, fraction, progress_text(progress), progress.runs + progress.known)
+        ProgressLine(
+            fraction=fraction, message=progress_text(progress), reached=progress.runs + progress.known
+        ).print_on(console)
 
     yield show
 
@@ -135,7 +137,8 @@ def run_lines(console: Console) -> Iterator[Callable[[float, float], None]]:
         percent = int(100 * time / end)
         if percent != shown:
             shown = percent
-            _print_line(console, min(time / end, 1.0), f"time {time:g} of {end:g}", percent)
+            message = f"time {time:g} of {end:g}"
+            ProgressLine(fraction=min(time / end, 1.0), message=message, reached=percent).print_on(console)
 
     yield show
 
@@ -176,11 +179,6 @@ def progress_text(progress: JobProgress[Any]) -> str:
         f"{progress.runs} runs{known}, {len(progress.running)} running, "
         f"{_duration(progress.elapsed)} elapsed, {_time_left(progress)}"
     )
-
-
-def _print_line(console: Console, fraction: float, message: str, reached: float) -> None:
-    line = ProgressLine(fraction=fraction, message=message, reached=reached)
-    console.print(line.model_dump_json(), soft_wrap=True, highlight=False, markup=False)
 
 
 @contextmanager

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from pydantic import BaseModel, ConfigDict, Field
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 
 class ProgressLine(BaseModel):
@@ -24,3 +29,13 @@ class ProgressLine(BaseModel):
     fraction: float = Field(ge=0, le=1)
     message: str
     reached: float = Field(ge=0)
+
+    def print_on(self, console: Console) -> None:
+        """Print the line.
+
+        Parameters
+        ----------
+        console : Console
+            Where it is printed.
+        """
+        console.print(self.model_dump_json(), soft_wrap=True, highlight=False, markup=False)

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from ensemble.store.columns import ListColumn
     from ensemble.store.listing import Listing
 
-_ENDS = 2  # of a bracket, hence limits that are run first, and runs that certify a bracket
+_ENDS = 2  # of a bracket, hence limits that are run first, and runs at finer numerics
 
 
 class StudyQuestion(Question[Study]):
@@ -80,7 +80,8 @@ class StudyQuestion(Question[Study]):
     def planned_runs(self) -> Iterator[tuple[Scene, int]]:
         """See `Question`.
 
-        Counted are the values of the scan all over the limits, those of a bisection, and both ends.
+        Counted are the values of the scan all over the limits, those of a bisection, both ends, and these
+        again at finer numerics: they certify, or confirm an end that is sensitive, as most are.
         """
         study = self.document
         low, high = study.search.limits
@@ -91,8 +92,7 @@ class StudyQuestion(Question[Study]):
             scenes = [study.scene_at(sweep_value, limit) for limit in study.search.limits]
             costliest = max(scenes, key=run_work)
             yield from ((scene, searching if scene is costliest else 0) for scene in scenes)
-            if study.search.certify:
-                yield certifying_scene(costliest), _ENDS
+            yield certifying_scene(costliest), _ENDS
 
     def answer(
         self,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 from sqlalchemy import Executable, Select, Text, bindparam, cast, delete, func, insert, select, tuple_
 from sqlalchemy.exc import DatabaseError
@@ -20,6 +21,7 @@ from ensemble.store.catalog_tables import (
 )
 from ensemble.store.filters import conditions, number, order, within
 from ensemble.store.listing import BATCH, Listing, ParameterRange
+from ensemble.store.record_fields import Fields
 from ensemble.store.run_record import RunSummary
 from ensemble.store.sql_database import Place, engine, reading_engine, transaction
 from ensemble.timestamp import timestamp_text
@@ -163,12 +165,7 @@ class Catalog:
             Only some of them are in memory at once, and between two of them the database is not locked.
         """
         row = RunRow
-        keys = select(row.key).where(*conditions(listing.where, row.document, RUN_FIELDS))
-        if listing.sort == "created":
-            keys = keys.order_by(row.created, row.key)
-        elif listing.sort is not None:
-            keys = keys.order_by(*order(listing.sort, row.document, RUN_FIELDS))
-        return self._batches(keys.order_by(row.created.desc(), row.key.desc()), listing, _RUN, row.key)
+        return self._listed(listing, row.key, row.created, row.document, RUN_FIELDS, _RUN)
 
     def runs_within(self, ranges: Sequence[ParameterRange]) -> Iterator[Record]:
         """Find runs whose scenes have parameters within some ranges, one for each combination of values.
@@ -187,7 +184,7 @@ class Catalog:
         met = [within(each, document, RUN_FIELDS) for each in ranges]
         values = [number(each.path, document, RUN_FIELDS) for each in ranges]
         keys = select(func.min(RunRow.key)).where(*met).group_by(*values)
-        return self._batches(keys, Listing(), _RUN, RunRow.key)
+        return self._batches(keys, _RUN, RunRow.key)
 
     def runs_page(self, where: Sequence[str], after: str | None, limit: int) -> list[Record]:
         """Return a part of the runs that meet all filters, newest first.
@@ -254,13 +251,7 @@ class Catalog:
             See `runs`.
         """
         row = BoundaryRow
-        keys = select(row.study_key).where(*conditions(listing.where, row.document, BOUNDARY_FIELDS))
-        if listing.sort == "updated":
-            keys = keys.order_by(row.updated, row.study_key)
-        elif listing.sort is not None:
-            keys = keys.order_by(*order(listing.sort, row.document, BOUNDARY_FIELDS))
-        newest_first = keys.order_by(row.updated.desc(), row.study_key.desc())
-        return self._batches(newest_first, listing, _BOUNDARY, row.study_key)
+        return self._listed(listing, row.study_key, row.updated, row.document, BOUNDARY_FIELDS, _BOUNDARY)
 
     def boundaries_page(self, where: Sequence[str], after: str | None, limit: int) -> list[Record]:
         """Return a part of the boundaries that meet all filters, by ascending key.
@@ -293,15 +284,28 @@ class Catalog:
         with self._engine.connect() as connection:
             return [Record(key, json) for key, json in connection.execute(query)]
 
-    def _batches(
+    def _listed(
         self,
-        keys: Select[str],
         listing: Listing,
-        records: Select[str, str],
         key: InstrumentedAttribute[str],
+        moment: InstrumentedAttribute[str],
+        document: InstrumentedAttribute[Any],
+        fields: Fields,
+        records: Select[str, str],
+    ) -> Iterator[Record]:
+        keys = select(key).where(*conditions(listing.where, document, fields))
+        if listing.sort == moment.key:
+            keys = keys.order_by(moment, key)
+        elif listing.sort is not None:
+            keys = keys.order_by(*order(listing.sort, document, fields))
+        newest_first = keys.order_by(moment.desc(), key.desc())
+        return self._batches(newest_first.limit(listing.limit), records, key)
+
+    def _batches(
+        self, keys: Select[str], records: Select[str, str], key: InstrumentedAttribute[str]
     ) -> Iterator[Record]:
         with self._engine.connect() as connection:
-            found = [row[0] for row in connection.execute(keys.limit(listing.limit))]
+            found = [row[0] for row in connection.execute(keys)]
         for begin in range(0, len(found), BATCH):
             batch = found[begin : begin + BATCH]
             there = {record.key: record for record in self._all(records.where(key.in_(batch)))}

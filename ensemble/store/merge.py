@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from ensemble.store.listing import Listing
+from ensemble.store.reading import validated
+from ensemble.store.run_record import RunSummary
 from ensemble.store.store import Store
 
 
@@ -42,7 +44,7 @@ def merge(source: Store, target: Store) -> Merged:
         if target.contains(record.key):
             known += 1
             continue
-        target.save(source.load(record.key), source.summary(record.key))
+        target.save(source.load(record.key), validated(RunSummary, "run", record))
         runs += 1
     return Merged(runs, _merge_boundaries(source, target), _merge_branches(source, target), known)
 

@@ -39,7 +39,7 @@ def runs(store: Path) -> int:
     if not (store / "runs").exists():
         return 0
     with Store.existing(store) as opened:
-        return sum(1 for _ in opened.summaries())
+        return opened.count_runs()
 
 
 def wait_while_going_on(cluster: slurm.Cluster, job: str, log: Path, condition: Callable[[], object]) -> None:

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from ensemble.config.certifying_scene import certifying_scene
 from ensemble.config.documents import load_scene, load_study, preset_document, preset_names
 from ensemble.config.run_key import run_key
 from ensemble.questions import kind_named, kind_of, kind_of_model, kinds, preset_question
@@ -59,13 +60,17 @@ def test_the_scene_that_decides_about_ranks_is_that_of_the_document() -> None:
     assert preset_question("doublet-shear", {}).scene == load_scene("doublet-shear")
 
 
-def test_a_certified_search_costs_two_finer_runs_more_at_each_point() -> None:
-    plain = preset_question("critical-hamaker", {}).cost
-    certified = preset_question("critical-hamaker", {"search.certify": True}).cost
-    points = len(load_study("critical-hamaker").sweep.values)
-    assert certified.runs == plain.runs + 2 * points
-    work_of_a_run = plain.work / plain.runs
-    assert certified.work == pytest.approx(plain.work + 2 * points * 2 * work_of_a_run)
+def test_two_runs_at_finer_numerics_are_planned_at_each_point() -> None:
+    study = load_study("critical-hamaker")
+    finer = [
+        (certifying_scene(study.scene_at(sweep_value, end)), 2)
+        for sweep_value in study.sweep.values
+        for end in study.search.limits
+    ]
+    for changes in ({}, {"search.certify": True}):  # a certification takes over the runs that confirm
+        planned = list(preset_question("critical-hamaker", changes).planned_runs())
+        assert sum(planned.count(each) for each in finer) == len(study.sweep.values)
+        assert sum(count for _, count in planned) > 2 * len(planned)
 
 
 def test_a_run_that_would_record_too_much_is_refused_by_its_interval() -> None:
