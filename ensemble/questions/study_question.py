@@ -194,9 +194,7 @@ class StudyQuestion(Question[Study]):
         ValueError
             If there are several; names their keys.
         """
-        boundaries = store.boundaries()
-        named = [boundary for boundary in boundaries if boundary.name == name]
-        named = named or [boundary for boundary in boundaries if boundary.study_key.startswith(name)]
+        named = store.boundaries_named(name)
         if len(named) > 1:
             keys = ", ".join(f"{each.study_key} of {each.updated:%Y-%m-%d %H:%M:%S}" for each in named)
             raise ValueError(f"{name!r} — {len(named)} boundaries; name one by its key: {keys}")

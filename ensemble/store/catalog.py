@@ -238,6 +238,23 @@ class Catalog:
         """
         return self._one(_ONE_BOUNDARY, study_key)
 
+    def boundaries_named(self, name: str) -> list[Record]:
+        """Return the boundaries of a name, or else those whose key begins with it; the latest change last.
+
+        Parameters
+        ----------
+        name : str
+            Name of the study, or the first characters of its key.
+
+        Returns
+        -------
+        list of Record
+        """
+        by_change = _BOUNDARY.order_by(BoundaryRow.updated, BoundaryRow.study_key)
+        has_name = BoundaryRow.document["name"].as_string() == name
+        begins_so = BoundaryRow.study_key.startswith(name, autoescape=True)
+        return self._all(by_change.where(has_name)) or self._all(by_change.where(begins_so))
+
     def boundaries(self, listing: Listing) -> Iterator[Record]:
         """Find boundaries, the latest change first unless the listing says otherwise.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import TypeVar
 
 from pydantic import ValidationError
@@ -46,7 +46,7 @@ def validated(model: type[AnyDocument], kind: str, record: Record) -> AnyDocumen
         ) from error
 
 
-def readable(model: type[AnyDocument], kind: str, records: Iterator[Record]) -> Iterator[AnyDocument]:
+def readable(model: type[AnyDocument], kind: str, records: Iterable[Record]) -> Iterator[AnyDocument]:
     """Read records, leaving out those that this version cannot read, with a warning that names each.
 
     Parameters
@@ -55,7 +55,7 @@ def readable(model: type[AnyDocument], kind: str, records: Iterator[Record]) -> 
         `RunSummary` or `Boundary`.
     kind : str
         Its name in messages.
-    records : iterator of Record
+    records : iterable of Record
 
     Yields
     ------

@@ -549,6 +549,20 @@ class Store(AbstractContextManager["Store"]):
         listing = Listing(tuple(where), sort="updated")
         return list(readable(Boundary, "boundary", self._catalog.boundaries(listing)))
 
+    def boundaries_named(self, name: str) -> list[Boundary]:
+        """Return the boundaries of a name, or else those whose key begins with it; the latest change last.
+
+        Parameters
+        ----------
+        name : str
+            Name of the study, or the first characters of its key.
+
+        Returns
+        -------
+        list of Boundary
+        """
+        return list(readable(Boundary, "boundary", self._catalog.boundaries_named(name)))
+
     def boundary_records(self, listing: Listing) -> Iterator[Record]:
         """Find boundaries, the latest change first unless the listing says otherwise.
 

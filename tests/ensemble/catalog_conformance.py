@@ -226,6 +226,21 @@ class CatalogConformance:
         with pytest.raises(StoreInputError, match="after"):
             filled.runs_page(after="nothing")
 
+    def test_boundaries_by_their_name_or_the_beginning_of_their_key(self, store: Store) -> None:
+        others = {"abc": "50% of _all_", "abd": "critical", "ac": "critical"}
+        for hour, (study_key, name) in enumerate(others.items()):
+            made = boundary(study_key, 0.1, None, NOON - timedelta(hours=hour))
+            store.save_boundary(made.model_copy(update={"name": name}))
+
+        def found(name: str) -> list[str]:
+            return [each.study_key for each in store.boundaries_named(name)]
+
+        assert found("critical") == ["ac", "abd"], "the latest change last"
+        assert found("50% of _all_") == ["abc"]
+        assert found("ab") == ["abd", "abc"]
+        assert found("abc") == ["abc"]
+        assert found("%") == found("_b") == found("c") == found("crit") == []
+
     def test_pages_of_boundaries_are_in_the_order_of_their_keys(self, store: Store) -> None:
         for study_key in "cab":
             store.save_boundary(boundary(study_key, 0.1, None, NOON))
