@@ -8,18 +8,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, closing, suppress
 from functools import cached_property
+from http import HTTPStatus
 from ipaddress import ip_address
 from itertools import count
 from typing import TYPE_CHECKING, Any, Final
 from urllib.request import getproxies, proxy_bypass
 from uuid import uuid4
 
-import httpx
+import httpx2
 import numpy as np
-from httpx_sse import connect_sse
-from tenacity import retry, retry_if_exception_type, stop_after_delay, wait_exponential
+from tenacity import RetryCallState, retry, retry_if_exception, stop_before_delay, wait_exponential
 
 from api.jobs.job import Job
 from api.jobs.submissions import Estimate, PresetDocument
@@ -33,17 +33,13 @@ from solver.scene import Model
 if TYPE_CHECKING:
     import xarray
 
-RETRY_SECONDS: Final = 60.0  # time for which requests to a service that cannot be reached are repeated
+RETRY_SECONDS: Final = 60.0  # time for which requests to a service that cannot answer now are repeated
 TIMEOUT_SECONDS: Final = 30.0  # of one request
 VALUES_AT_ONCE: Final = 500_000  # in one answer; half of the default limit of the service
-
-# Repeating a request is safe: a submission has an idempotency key, so it makes one job.
-_with_retries = retry(
-    retry=retry_if_exception_type(httpx.TransportError),
-    wait=wait_exponential(multiplier=0.1, max=5.0),
-    stop=stop_after_delay(RETRY_SECONDS),
-    reraise=True,
-)
+# Of a service in an outage, and of a proxy whose service is away.
+UNAVAILABLE: Final = (HTTPStatus.BAD_GATEWAY, HTTPStatus.SERVICE_UNAVAILABLE, HTTPStatus.GATEWAY_TIMEOUT)
+# How a stream of events is interrupted.
+INTERRUPTIONS: Final = (httpx2.NetworkError, httpx2.ProtocolError, httpx2.TimeoutException)
 
 
 class Refused(EnsembleError):  # noqa: N818
@@ -55,6 +51,8 @@ class Refused(EnsembleError):  # noqa: N818
         HTTP status.
     problem : mapping
         The whole answer (RFC 9457).
+    retry_after : int, optional
+        Seconds after which the service wants to be asked again.
 
     Attributes
     ----------
@@ -62,12 +60,39 @@ class Refused(EnsembleError):  # noqa: N818
         HTTP status.
     problem : dict
         The whole answer (RFC 9457).
+    retry_after : int or None
+        Seconds after which the service wants to be asked again.
     """
 
-    def __init__(self, status: int, problem: Mapping[str, Any]) -> None:
+    def __init__(self, status: int, problem: Mapping[str, Any], retry_after: int | None = None) -> None:
         super().__init__(problem["detail"])
         self.status = status
         self.problem = dict(problem)
+        self.retry_after = retry_after
+
+
+def _passes(error: BaseException) -> bool:
+    """Tell whether the same request may succeed a little later."""
+    if isinstance(error, Refused):
+        return error.status in UNAVAILABLE or error.retry_after is not None
+    return isinstance(error, httpx2.TransportError)
+
+
+_growing_wait = wait_exponential(multiplier=0.1, max=5.0)
+
+
+def _wait(state: RetryCallState) -> float:
+    """Return the seconds until the next attempt: as the service says, or a time that grows."""
+    error = state.outcome.exception() if state.outcome else None
+    if isinstance(error, Refused) and error.retry_after is not None:
+        return error.retry_after
+    return _growing_wait(state)
+
+
+# Repeating a request is safe: a submission has an idempotency key, so it makes one job.
+_with_retries = retry(
+    retry=retry_if_exception(_passes), wait=_wait, stop=stop_before_delay(RETRY_SECONDS), reraise=True
+)
 
 
 class TracedBoundary(BoundaryDocument):
@@ -137,7 +162,7 @@ class StoredRun:
                 break
         return {name: np.concatenate(arrays) for name, arrays in pieces.items()}
 
-    def _pages(self, part: str, values: int, **options: Any) -> Iterator[httpx.Response]:
+    def _pages(self, part: str, values: int, **options: Any) -> Iterator[httpx2.Response]:
         """Yield consecutive answers about all rows of so many values, without end."""
         at_once = max(VALUES_AT_ONCE // values, 1)
         for start in count(step=at_once):
@@ -185,8 +210,9 @@ class Client(AbstractContextManager["Client"]):
     """A connection to a service.
 
     Use it as a context manager, or close it. While the service cannot be reached, for example during a
-    restart, requests are repeated for a minute; then `httpx.TransportError` is raised. A service on this
-    machine is reached directly, whatever proxy the environment names; for others the error names the proxy.
+    restart, or answers that it is unavailable or when it wants to be asked again, requests are repeated for a
+    minute at most; then `httpx2.TransportError` or `Refused` is raised. A service on this machine is reached
+    directly, whatever proxy the environment names; for others the error names the proxy.
 
     Parameters
     ----------
@@ -198,9 +224,9 @@ class Client(AbstractContextManager["Client"]):
 
     def __init__(self, url: str, token: str | None = None) -> None:
         headers = {} if token is None else {"Authorization": f"Bearer {token}"}
-        host = httpx.URL(url).host
-        self._proxy = None if _is_loopback(host) else _proxy_of(httpx.URL(url))
-        self._http = httpx.Client(
+        host = httpx2.URL(url).host
+        self._proxy = None if _is_loopback(host) else _proxy_of(httpx2.URL(url))
+        self._http = httpx2.Client(
             base_url=url, headers=headers, timeout=TIMEOUT_SECONDS, trust_env=not _is_loopback(host)
         )
 
@@ -346,18 +372,12 @@ class Client(AbstractContextManager["Client"]):
         """Yield the present state of a job and each new one, also across interrupted connections."""
         latest = job
         while not latest.status.finished:
-            try:
-                for latest in self._events(job):
+            # Each stream begins with the state at that time.
+            stream = self._request("GET", f"/jobs/{job.id}/events", stream=True)
+            with closing(stream), suppress(*INTERRUPTIONS):
+                for event in httpx2.EventSource(stream):
+                    latest = Job.model_validate_json(event.data)
                     yield latest
-            except httpx.TransportError:
-                # Wait for the service to return. A new stream of events begins with the state at that time.
-                self.get("/healthz")
-
-    def _events(self, job: Job) -> Iterator[Job]:
-        with connect_sse(self._http, "GET", f"/jobs/{job.id}/events") as source:
-            _checked(source.response)
-            for event in source.iter_sse():
-                yield Job.model_validate_json(event.data)
 
     def boundaries(self) -> Iterator[TracedBoundary]:
         """Return all boundaries of the store."""
@@ -433,7 +453,7 @@ class Client(AbstractContextManager["Client"]):
         """
         return StoredRun(RunSummary.model_validate_json(self.get(f"/runs/{key}").content), self)
 
-    def get(self, path: str, **options: Any) -> httpx.Response:
+    def get(self, path: str, **options: Any) -> httpx2.Response:
         """Send a GET request.
 
         Parameters
@@ -441,11 +461,11 @@ class Client(AbstractContextManager["Client"]):
         path : str
             Path, for example ``/runs``.
         **options
-            Options of `httpx.Client.request`, for example ``params``.
+            Options of `httpx2.Client.build_request`, for example ``params``.
 
         Returns
         -------
-        httpx.Response
+        httpx2.Response
 
         Raises
         ------
@@ -455,10 +475,11 @@ class Client(AbstractContextManager["Client"]):
         return self._request("GET", path, **options)
 
     @_with_retries
-    def _request(self, method: str, path: str, **options: Any) -> httpx.Response:
+    def _request(self, method: str, path: str, stream: bool = False, **options: Any) -> httpx2.Response:
+        request = self._http.build_request(method, path, **options)
         try:
-            return _checked(self._http.request(method, path, **options))
-        except httpx.TransportError as error:
+            return _checked(self._http.send(request, stream=stream))
+        except httpx2.TransportError as error:
             if self._proxy is not None:
                 error.add_note(f"The environment sends this request through the proxy {self._proxy}.")
             raise
@@ -479,7 +500,7 @@ def _is_loopback(host: str) -> bool:
         return host == "localhost"
 
 
-def _proxy_of(url: httpx.URL) -> str | None:
+def _proxy_of(url: httpx2.URL) -> str | None:
     """Return the proxy that the environment names for an address."""
     return None if proxy_bypass(url.host) else getproxies().get(url.scheme)
 
@@ -490,12 +511,17 @@ def _submission(work: str | Model, changes: Mapping[str, Any]) -> dict[str, Any]
     return {kind_of_model(work).kind: work.model_dump(mode="json"), "set": dict(changes)}
 
 
-def _checked(response: httpx.Response) -> httpx.Response:
+def _checked(response: httpx2.Response) -> httpx2.Response:
     if response.is_success:
         return response
     response.read()
-    is_problem = "json" in response.headers.get("Content-Type", "")
-    raise Refused(response.status_code, response.json() if is_problem else {"detail": response.reason_phrase})
+    is_problem = "problem+json" in response.headers.get("Content-Type", "")
+    retry_after = response.headers.get("Retry-After", "")
+    raise Refused(
+        response.status_code,
+        response.json() if is_problem else {"detail": response.reason_phrase},
+        int(retry_after) if retry_after.isdecimal() else None,
+    )
 
 
 def _number(value: float | None) -> float:

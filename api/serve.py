@@ -22,6 +22,7 @@ from api.auth.authentication import Authentication, is_loopback
 from api.auth.tokens import Tokens
 from api.database.service_database import Database, look_up_for
 from api.http.bounded_protocol import ConnectionLimits, bounded_protocol
+from api.http.open_streams import OpenStreams
 from api.http.rate_limits import RateLimits
 from api.jobs.job_queue import Jobs
 from api.jobs.submissions import Submissions, job_limits
@@ -103,11 +104,8 @@ def open_service(settings: Settings) -> Iterator[Service]:
             watched_jobs=TTLCache(WATCHED_JOBS, ttl=settings.event_seconds / 2),
             tokens=tokens,
             limits=limits,
-            authentication=Authentication(
-                tokens,
-                limits,
-                look_up=look_up,
-            ),
+            streams=OpenStreams(settings.event_streams),
+            authentication=Authentication(tokens, limits, look_up),
             look_up=look_up,
         )
 

@@ -116,6 +116,11 @@ class Settings(BaseSettings):
         "names the client.",
     )
 
+    event_streams: int = Field(
+        100,
+        ge=1,
+        description="Streams of events that one user may have open; further ones are answered with 429.",
+    )
     event_seconds: float = Field(
         0.5,
         gt=0,

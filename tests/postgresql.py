@@ -9,11 +9,12 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from uuid import uuid4
 
+import psutil
 from sqlalchemy import URL
 
 ROOT = 0
@@ -44,6 +45,23 @@ class Server:
         if self.process is not None:
             self.process.send_signal(signal.SIGINT)
             self.process.wait()
+
+    @contextmanager
+    def suspended(self) -> Iterator[None]:
+        """Let it say nothing, to new connections and to open ones, as long as the block runs."""
+        assert self.process is not None
+        main = psutil.Process(self.process.pid)
+        main.suspend()  # first, so that it starts no others
+        suspended = [main]
+        for process in main.children(recursive=True):
+            with suppress(psutil.NoSuchProcess):
+                process.suspend()
+                suspended.append(process)
+        try:
+            yield
+        finally:
+            for process in suspended:
+                process.resume()
 
     @property
     def data(self) -> Path:

@@ -191,7 +191,7 @@ def _require_this_machine(request: Request) -> None:
     if len(host) > LONGEST_HOST or not _names_loopback(host) or not is_loopback(_address(request)):
         raise Problem(
             HTTPStatus.MISDIRECTED_REQUEST,
-            "Host: a service without tokens answers to localhost and 127.0.0.1 only",
+            "Host: a service without tokens answers to localhost and loopback addresses only",
         )
     origin = request.headers.get("origin")
     # Browsers that know Sec-Fetch-Site have been checked by it, also behind a proxy that changes the host.

@@ -13,10 +13,19 @@ from alembic import command
 from alembic.config import Config
 from anyio import fail_after, to_thread
 from sqlalchemy import Connection, Engine
+from sqlalchemy.exc import OperationalError
 
 from ensemble.disk import locked
 from ensemble.errors import BadInput
-from ensemble.store.sql_database import UNUSABLE, engine, is_file, reason, transaction
+from ensemble.store.sql_database import (
+    UNUSABLE,
+    engine,
+    is_file,
+    is_locked,
+    reason,
+    transaction,
+    without_waiting,
+)
 
 MIGRATIONS = "api:database/migrations"
 LOCK = "database.lock"
@@ -130,7 +139,7 @@ class LookUp(Protocol):
 async def read_inline(
     read: Callable[Arguments, Result], /, *arguments: Arguments.args, **named: Arguments.kwargs
 ) -> Result:
-    """Call a function in the event loop itself; see `LookUp`.
+    """Call a function in the event loop itself, or in another thread while the file is locked; see `LookUp`.
 
     Parameters
     ----------
@@ -143,7 +152,13 @@ async def read_inline(
     object
         The result of `read`.
     """
-    return read(*arguments, **named)
+    try:
+        with without_waiting():
+            return read(*arguments, **named)
+    except OperationalError as error:
+        if not is_locked(error):
+            raise
+    return await read_in_thread(read, *arguments, **named)
 
 
 async def read_in_thread(

@@ -286,29 +286,33 @@ def dismiss_job(submitter: Submitter, identifier: JobKey) -> Job:
     return submitter.service.jobs.dismiss(identifier)
 
 
-async def read_watched_job(reader: Reader, identifier: JobKey) -> Record:
-    """Return the job that a client wants to watch, before the stream of its events begins.
+async def open_stream(reader: Reader, identifier: JobKey) -> AsyncIterator[Record]:
+    """Count a stream of events, and give its job before it begins.
 
     Parameters
     ----------
     reader : Caller
     identifier : str
 
-    Returns
-    -------
+    Yields
+    ------
     Record
 
     Raises
     ------
     NoSuchJob
         If there is no such job.
+    Problem
+        If the user has too many streams open.
     """
-    return await reader.service.look_up(reader.service.jobs.records.one, identifier)
+    service = reader.service
+    with service.streams.counted(reader.user):
+        yield await service.look_up(service.jobs.records.one, identifier)
 
 
 @router.get("/jobs/{identifier}/events", response_class=EventSourceResponse, responses=NO_SUCH_JOB)
 async def watch_job(
-    request: Request, reader: Reader, record: Annotated[Record, Depends(read_watched_job)]
+    request: Request, reader: Reader, record: Annotated[Record, Depends(open_stream)]
 ) -> AsyncIterator[ServerSentEvent]:
     """Send the present state of the job, and the new one after each change, until the job has finished.
 

@@ -14,6 +14,7 @@ from api.auth import TokenScope
 from api.auth.authentication import Authentication, Identity
 from api.auth.tokens import Tokens
 from api.database.service_database import LookUp
+from api.http.open_streams import OpenStreams
 from api.http.rate_limits import RateLimits
 from api.jobs.job_queue import Jobs
 from api.jobs.submissions import Submissions
@@ -38,6 +39,8 @@ class Service:
         Recently read jobs by their identifiers, shared by all clients that listen to events.
     tokens : Tokens
     limits : RateLimits
+    streams : OpenStreams
+        Of events.
     authentication : Authentication
         Of requests, by the tokens.
     look_up : LookUp
@@ -51,6 +54,7 @@ class Service:
     watched_jobs: TTLCache[str, Record]
     tokens: Tokens
     limits: RateLimits
+    streams: OpenStreams
     authentication: Authentication
     look_up: LookUp
 

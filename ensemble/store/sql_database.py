@@ -14,6 +14,7 @@ import shutil
 import sqlite3
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
+from contextvars import ContextVar
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -51,6 +52,8 @@ CONNECTING = {
 }
 
 Journal = Literal["wal", "delete"]
+
+_busy_seconds = ContextVar("busy_seconds", default=BUSY_SECONDS)  # for which a locked file is waited for
 
 # What is raised where a URL is invalid, its driver is missing, or the database does not answer.
 UNUSABLE = (ArgumentError, NoSuchModuleError, ModuleNotFoundError, DBAPIError, NoConnectionLeft)
@@ -186,7 +189,9 @@ def engine(url: str, journal: Journal = "wal") -> Engine:
     """
     if not is_file(url):
         return _server_engine(url)
-    made = create_engine(url, connect_args={"timeout": BUSY_SECONDS})
+    made = create_engine(url)
+    event.listen(made, "connect", _set_patience)
+    event.listen(made, "checkout", _set_patience)
     event.listen(made, "connect", partial(_durable, journal))
     path = Path(make_url(url).database or "")
     event.listen(made, "connect", partial(_note_file, path))
@@ -199,12 +204,17 @@ def _server_engine(url: str) -> Engine:
     address = make_url(url)
     is_postgresql = address.get_backend_name() == "postgresql"
     options = {name: value for name, value in CONNECTING.items() if name not in address.query}
-    return create_engine(
+    made = create_engine(
         address,
         pool_pre_ping=True,
         pool_timeout=POOL_SECONDS,
         connect_args=options if is_postgresql else {},
     )
+    if address.drivername == "postgresql+psycopg":
+        from ensemble.store.silent_servers import connect  # the driver is an extra
+
+        event.listen(made, "do_connect", connect)
+    return made
 
 
 @contextmanager
@@ -315,6 +325,40 @@ def _in_wal_mode(path: Path) -> bool:
     """Tell from its header whether readers of an SQLite file need a write-ahead log."""
     with path.open("rb") as file:
         return file.read(20)[18:20] == b"\x02\x02"
+
+
+def _set_patience(connection: DBAPIConnection, record: ConnectionPoolEntry, *_: object) -> None:
+    seconds = _busy_seconds.get()
+    if record.info.get("busy seconds") != seconds:
+        cursor = connection.cursor()
+        cursor.execute(f"PRAGMA busy_timeout={1000 * seconds}")
+        cursor.close()
+        record.info["busy seconds"] = seconds
+
+
+@contextmanager
+def without_waiting() -> Iterator[None]:
+    """Let connections to an SQLite file fail at once if it is locked, as `is_locked` tells."""
+    token = _busy_seconds.set(0)
+    try:
+        yield
+    finally:
+        _busy_seconds.reset(token)
+
+
+def is_locked(error: OperationalError) -> bool:
+    """Tell whether an SQLite file could not be used because another process writes to it.
+
+    Parameters
+    ----------
+    error : OperationalError
+
+    Returns
+    -------
+    bool
+    """
+    code = getattr(error.orig, "sqlite_errorcode", sqlite3.SQLITE_OK)
+    return bool(code & 0xFF == sqlite3.SQLITE_BUSY)  # its other bits are details
 
 
 def _durable(journal: Journal, connection: DBAPIConnection, _: ConnectionPoolEntry) -> None:

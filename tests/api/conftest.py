@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-import httpx
+import httpx2
 import pytest
 
 from api.database.service_database import Database
@@ -54,14 +54,14 @@ def filled_store(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="session")
-def reading(filled_store: Path) -> Iterator[httpx.Client]:
+def reading(filled_store: Path) -> Iterator[httpx2.Client]:
     """A client of a service of the filled store; tests only read."""
     with client_of(filled_store) as client:
         yield client
 
 
 @pytest.fixture
-def submitting(store: Path) -> Iterator[httpx.Client]:
+def submitting(store: Path) -> Iterator[httpx2.Client]:
     """A client of a service of an empty store without workers."""
     with client_of(store) as client:
         yield client

@@ -10,7 +10,7 @@ from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
-import httpx
+import httpx2
 import uvicorn
 from fastapi import APIRouter
 
@@ -61,11 +61,11 @@ def _port(server: uvicorn.Server, thread: threading.Thread) -> int:
 @contextmanager
 def client_of(
     store: Path, token: str | None = None, routers: Iterable[APIRouter] = (), **limits: Any
-) -> Iterator[httpx.Client]:
+) -> Iterator[httpx2.Client]:
     """Serve a store and give a client of this service."""
     headers = {} if token is None else {"Authorization": f"Bearer {token}"}
     with (
         serving(store, routers, **limits) as address,
-        httpx.Client(base_url=address, headers=headers, timeout=30) as client,
+        httpx2.Client(base_url=address, headers=headers, timeout=30) as client,
     ):
         yield client

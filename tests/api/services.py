@@ -17,7 +17,7 @@ from tests.api.processes import alive, wait_until
 
 SERVE = (sys.executable, "-m", "ensemble", "serve")
 SECONDS_TO_STOP = 30
-_ADDRESS = re.compile(r"running on http://[\d.]+:(\d+)")
+_ADDRESS = re.compile(r"running on (http://\S+:(\d+))")
 
 
 @dataclass(frozen=True)
@@ -25,13 +25,9 @@ class StartedService:
     """A service that answers, and the file with everything that it has logged."""
 
     process: subprocess.Popen[bytes]
+    url: str
     port: int
     log: Path
-
-    @property
-    def url(self) -> str:
-        """The address of the service on this machine."""
-        return f"http://127.0.0.1:{self.port}"
 
     def logged(self) -> str:
         """Return what the service has logged so far."""
@@ -78,12 +74,12 @@ def start_service(store: Path, *options: str, port: int = 0) -> StartedService:
             start_new_session=True,
         )
 
-    def used_port() -> int:
+    def address() -> re.Match[str] | None:
         assert process.poll() is None, log.read_text(encoding="utf-8")
-        found = _ADDRESS.search(log.read_text(encoding="utf-8"))
-        return 0 if found is None else int(found[1])
+        return _ADDRESS.search(log.read_text(encoding="utf-8"))
 
-    return StartedService(process, wait_until(used_port), log)
+    found = wait_until(address)
+    return StartedService(process, found[1], int(found[2]), log)
 
 
 @contextmanager

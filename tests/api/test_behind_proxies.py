@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
-import httpx
+import httpx2
 import pytest
 from playwright.sync_api import expect, sync_playwright
 
@@ -40,7 +40,7 @@ def stripping_proxy(service: str) -> Iterator[str]:
             body = self.rfile.read(int(self.headers.get("Content-Length", 0)))
             headers = {name: value for name, value in self.headers.items() if name.lower() != "host"}
             address = service + self.path.removeprefix(PREFIX)
-            answer = httpx.request(self.command, address, headers=headers, content=body, timeout=30)
+            answer = httpx2.request(self.command, address, headers=headers, content=body, timeout=30)
             self.send_response(answer.status_code)
             for name, value in answer.headers.items():
                 if name not in HOP_BY_HOP:
@@ -67,15 +67,15 @@ def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 
 
 def test_addresses_in_answers_hold_behind_a_prefix(address: str) -> None:
-    page = httpx.get(f"{address}/runs", params={"limit": 1})
+    page = httpx2.get(f"{address}/runs", params={"limit": 1})
     keys = [page.json()["items"][0]["key"]]
     while page.json()["next"]:
-        page = httpx.get(page.url.join(page.json()["next"]))
+        page = httpx2.get(page.url.join(page.json()["next"]))
         keys += [item["key"] for item in page.json()["items"]]
-    assert sorted(keys) == sorted(item["key"] for item in httpx.get(f"{address}/runs").json()["items"])
+    assert sorted(keys) == sorted(item["key"] for item in httpx2.get(f"{address}/runs").json()["items"])
     assert len(keys) > 1
-    submitted = httpx.post(f"{address}/jobs", json={"preset": "doublet-shear"})
-    job = httpx.get(submitted.url.join(submitted.headers["location"]))
+    submitted = httpx2.post(f"{address}/jobs", json={"preset": "doublet-shear"})
+    job = httpx2.get(submitted.url.join(submitted.headers["location"]))
     assert job.json()["id"] == submitted.json()["id"]
 
 
@@ -111,6 +111,6 @@ def test_no_proxy_is_used_for_this_machine(tmp_path: Path, monkeypatch: pytest.M
 def test_an_error_names_the_proxy(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("http_proxy", "http://127.0.0.1:1")
     monkeypatch.setattr(client_module.Client._request.retry, "stop", lambda _: True)  # type: ignore[attr-defined]
-    with Client("http://vesicles.example") as client, pytest.raises(httpx.TransportError) as raised:
+    with Client("http://vesicles.example") as client, pytest.raises(httpx2.TransportError) as raised:
         client.get("/healthz")
     assert "http://127.0.0.1:1" in " ".join(raised.value.__notes__)

@@ -9,6 +9,7 @@ from contextlib import contextmanager, suppress
 from datetime import timedelta
 from pathlib import Path
 
+import httpx2
 import numpy as np
 import pytest
 
@@ -176,6 +177,61 @@ def test_a_request_whose_answer_is_lost_makes_one_job(tmp_path: Path) -> None:
         with losing_the_first_answer(port) as unreliable, Client(unreliable) as client:
             job = client.submit("vesicle-shear")
         assert [known.id for known in direct.jobs()] == [job.id]
+
+
+def test_a_service_in_an_outage_is_asked_again_when_it_says(
+    submitter: Client, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("api.http.problems.RETRY_SECONDS", 1)
+    store, elsewhere = tmp_path / "store", tmp_path / "elsewhere"
+    statuses: list[int] = []
+
+    def bring_back(response: httpx2.Response) -> None:
+        statuses.append(response.status_code)
+        if len(statuses) == 2:
+            elsewhere.rename(store)
+
+    submitter._http.event_hooks = {"response": [bring_back]}
+    store.rename(elsewhere)
+    job = submitter.submit("vesicle-shear")
+    assert statuses == [503, 503, 202]
+    assert [known.id for known in submitter.jobs()] == [job.id]
+
+
+def test_a_service_that_asks_for_more_patience_than_a_client_has_refuses(
+    submitter: Client, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("api.http.problems.RETRY_SECONDS", 3600)
+    statuses: list[int] = []
+    submitter._http.event_hooks = {"response": [lambda response: statuses.append(response.status_code)]}
+    store = tmp_path / "store"
+    store.rename(tmp_path / "elsewhere")
+    with pytest.raises(Refused, match="cannot be used at the moment") as refusal:
+        submitter.submit("vesicle-shear")
+    (tmp_path / "elsewhere").rename(store)
+    assert (refusal.value.status, refusal.value.retry_after) == (503, 3600)
+    assert statuses == [503]
+
+
+def test_waiting_goes_on_after_an_outage_of_the_store(
+    submitter: Client, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("api.http.problems.RETRY_SECONDS", 1)
+    job = submitter.submit("vesicle-shear")
+    store, elsewhere = tmp_path / "store", tmp_path / "elsewhere"
+    opened: list[int] = []
+
+    def bring_back(response: httpx2.Response) -> None:
+        opened.append(response.status_code)
+        if response.status_code == 503:
+            elsewhere.rename(store)
+
+    submitter._http.event_hooks = {"response": [bring_back]}
+    store.rename(elsewhere)
+    with Client(str(submitter._http.base_url)) as other:
+        finished = submitter.wait(job, lambda _: other.dismiss(job))
+    assert opened == [503, 200]
+    assert finished.status is JobStatus.DISMISSED
 
 
 def test_waiting_continues_when_the_service_is_killed_and_restarted(tmp_path: Path) -> None:

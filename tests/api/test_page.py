@@ -10,7 +10,7 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
-import httpx
+import httpx2
 import numpy as np
 import pytest
 from playwright.sync_api import Browser, ConsoleMessage, Page, Response, expect, sync_playwright
@@ -85,7 +85,7 @@ def run_path(run: Run) -> str:
 
 @pytest.fixture(scope="module")
 def job_path(url: str) -> str:
-    job = httpx.post(f"{url}/jobs", json={"preset": "doublet-shear", "set": {"horizon": 0.1}}).json()
+    job = httpx2.post(f"{url}/jobs", json={"preset": "doublet-shear", "set": {"horizon": 0.1}}).json()
     return f"/#/jobs/{job['id']}"
 
 
@@ -166,8 +166,8 @@ def test_a_submitted_study_is_shown_while_its_brackets_close(page: Page, url: st
     assert len(last) == 1
     assert max(max(each) for each in drawn if each) > 1.5 * max(last)
     # The page shows what the service answers.
-    job = httpx.get(f"{url}/jobs").json()["items"][0]
-    points = httpx.get(f"{url}/boundaries/{job['key']}").json()["points"]
+    job = httpx2.get(f"{url}/jobs").json()["items"][0]
+    points = httpx2.get(f"{url}/boundaries/{job['key']}").json()["points"]
     assert sorted(last) == pytest.approx(
         sorted(point["bracket"][1] - point["bracket"][0] for point in points)
     )
@@ -280,7 +280,7 @@ def test_the_flow_is_known_between_and_beyond_the_places_where_it_was_sampled(
 
 def test_a_long_run_is_fetched_in_several_requests(page: Page, url: str, run: Run) -> None:
     page.goto(url)
-    summary = httpx.get(f"{url}/runs/{run_key(run.scene)}").json()
+    summary = httpx2.get(f"{url}/runs/{run_key(run.scene)}").json()
     frames = """async ([run, most]) => {
         const { Frames } = await import(document.scripts[0].src.replace('main', 'frames'));
         const { states } = await Frames.of(run, new AbortController().signal, most);
@@ -312,8 +312,8 @@ def test_scripts_are_loaded_once_and_kept(page: Page, url: str) -> None:
     assert len(scripts) > 10
     for script in scripts:
         assert script.headers["cache-control"] == "public, max-age=31536000, immutable", script.url
-    assert httpx.get(f"{url}/assets/{'0' * 16}/main.js").status_code == 404
-    assert httpx.get(url).headers["cache-control"] == "no-cache"
+    assert httpx2.get(f"{url}/assets/{'0' * 16}/main.js").status_code == 404
+    assert httpx2.get(url).headers["cache-control"] == "no-cache"
 
 
 def test_any_field_may_be_changed(page: Page, url: str) -> None:
@@ -357,13 +357,13 @@ def test_every_preset_and_every_stored_scene_can_be_submitted_as_it_is(
 def test_a_job_is_canceled(page: Page, url: str) -> None:
     page.goto(f"{url}/#/jobs")
     work = {"preset": "doublet-shear", "set": {"criteria.revolutions": 1000, "horizon": 1e5}}
-    job = httpx.post(f"{url}/jobs", json=work).json()
+    job = httpx2.post(f"{url}/jobs", json=work).json()
     row = page.get_by_role("row").filter(has=page.locator(f"#job-{job['id']}"))
     expect(row).to_contain_text("running")
     row.get_by_role("button", name="Cancel").click()
     expect(row).to_contain_text("dismissed")
     expect(row.get_by_role("button")).to_have_count(0)
-    assert httpx.get(f"{url}/jobs/{job['id']}").json()["status"] == "dismissed"
+    assert httpx2.get(f"{url}/jobs/{job['id']}").json()["status"] == "dismissed"
 
 
 def test_a_critical_value_is_read(page: Page, url: str, boundary: str, finished_study: Any) -> None:
@@ -468,7 +468,7 @@ def test_a_job_is_followed_across_a_restart_of_the_service(page: Page, tmp_path:
     store = tmp_path / "store"
     first = start_service(store, "--workers=0")
     work = {"preset": "doublet-shear", "set": {"horizon": 4.0, "criteria.extensions": 1.0}}
-    job = httpx.post(f"{first.url}/jobs", json=work).json()
+    job = httpx2.post(f"{first.url}/jobs", json=work).json()
     page.goto(f"{first.url}/#/jobs/{job['id']}")
     expect(page.locator(".job-status")).to_contain_text("accepted")
     first.kill()

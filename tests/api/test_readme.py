@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import httpx
+import httpx2
 import pytest
 
 from api.settings import Settings
@@ -99,7 +99,7 @@ def assert_same_fields(documented: Any, actual: Any, path: str = "") -> None:
 
 def test_the_requests_get_the_documented_answers(address: str, tmp_path: Path) -> None:
     (tmp_path / ".curlrc").write_text(CURL_CONFIGURATION, encoding="utf-8")
-    (boundary,) = httpx.get(f"{address}/boundaries").json()["items"]
+    (boundary,) = httpx2.get(f"{address}/boundaries").json()["items"]
     first, *rest = blocks(section("REST by example"))
     assert first.text.strip() == f"SERVICE={ADDRESS}"
     variables = {"SERVICE": address, "STUDY": boundary["study_key"]}
@@ -122,9 +122,9 @@ def test_the_requests_get_the_documented_answers(address: str, tmp_path: Path) -
             assert last_document(output) == documented
             checked += 1
     assert checked >= 5
-    job = httpx.get(f"{address}/jobs/{variables['JOB']}").json()
+    job = httpx2.get(f"{address}/jobs/{variables['JOB']}").json()
     assert job["status"] == "succeeded"
-    run = httpx.get(f"{address}/runs/{variables['RUN']}").json()
+    run = httpx2.get(f"{address}/runs/{variables['RUN']}").json()
     points = 1 + 3 * len(run["scene"]["vesicles"]) * run["work"]["points"]
     assert (tmp_path / "frames.f32").stat().st_size % (4 * points) == 0
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
+import socket
 import subprocess
 from pathlib import Path
 from typing import Any
 
-import httpx
+import httpx2
 import psutil
 import pytest
 
@@ -38,7 +40,7 @@ def simulating(family: list[psutil.Process]) -> list[psutil.Process]:
 
 
 def test_a_study_is_traced_and_its_boundary_is_stored(ensemble, store):
-    with service(store) as server, httpx.Client(base_url=server.url, timeout=SECONDS) as client:
+    with service(store) as server, httpx2.Client(base_url=server.url, timeout=SECONDS) as client:
         assert "There are no tokens" in server.logged()
         job = client.post("/jobs", json=QUICK_STUDY).json()
         with client.stream("GET", f"/jobs/{job['id']}/events") as events:
@@ -60,7 +62,7 @@ def test_a_study_is_traced_and_its_boundary_is_stored(ensemble, store):
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGKILL])
 def test_no_process_is_left_however_the_server_ends(store, number):
     endless = {"preset": "critical-hamaker", "set": {"search.tolerance": 1e-6}, "ranks": 2}
-    with service(store) as server, httpx.Client(base_url=server.url, timeout=SECONDS) as client:
+    with service(store) as server, httpx2.Client(base_url=server.url, timeout=SECONDS) as client:
         job = client.post("/jobs", json=endless).json()
         wait_until(lambda: len(simulating(server.family())) >= 2)
         family = server.family()
@@ -70,7 +72,7 @@ def test_no_process_is_left_however_the_server_ends(store, number):
         wait_until(lambda: not alive(family), SECONDS_TO_DIE)
         assert "Traceback" not in server.logged()
     with service(store, "--workers=0") as again:
-        unfinished = httpx.get(f"{again.url}/jobs/{job['id']}").json()
+        unfinished = httpx2.get(f"{again.url}/jobs/{job['id']}").json()
         assert not unfinished["finished"], "a worker can continue it"
 
 
@@ -80,7 +82,7 @@ def test_a_worker_that_dies_is_replaced(store):
         worker.kill()
         (another,) = wait_until(lambda: [child for child in server.children() if child != worker])
         assert another.is_running()
-        assert httpx.get(f"{server.url}/healthz").status_code == 200
+        assert httpx2.get(f"{server.url}/healthz").status_code == 200
 
 
 @pytest.mark.parametrize("workers", [0, 2])
@@ -110,9 +112,30 @@ def test_another_address_needs_tokens(store):
     token = make_token(store, "ada", TokenScope.READ)
     with service(store, "--host=0.0.0.0", "--workers=0") as server:
         assert "There are no tokens" not in server.logged()
-        assert httpx.get(f"{server.url}/jobs").status_code == 401
+        assert httpx2.get(f"{server.url}/jobs").status_code == 401
         headers = {"Authorization": f"Bearer {token}"}
-        assert httpx.get(f"{server.url}/jobs", headers=headers).status_code == 200
+        assert httpx2.get(f"{server.url}/jobs", headers=headers).status_code == 200
+
+
+def has_address(host: str) -> bool:
+    with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET) as probe:
+        return probe.connect_ex((host, 9)) in (0, errno.ECONNREFUSED)
+
+
+@pytest.mark.parametrize("host", ["127.0.0.2", "::1"])
+def test_every_loopback_address_serves_this_machine_without_tokens(store, host):
+    if not has_address(host):
+        pytest.skip(f"this machine has no {host}")
+    with service(store, f"--host={host}", "--workers=0") as server:
+        assert httpx2.get(f"{server.url}/runs").status_code == 200
+        assert httpx2.post(f"{server.url}/estimate", json={"preset": "doublet-shear"}).status_code == 200
+        origin = {"Origin": server.url}
+        assert httpx2.get(f"{server.url}/runs", headers=origin).status_code == 200
+        elsewhere = {"Origin": "http://evil.example"}
+        assert httpx2.get(f"{server.url}/runs", headers=elsewhere).status_code == 403
+        named = httpx2.get(f"{server.url}/runs", headers={"Host": "evil.example"})
+        assert named.status_code == 421
+        assert "loopback" in named.json()["detail"]
 
 
 def test_settings_come_from_the_environment_and_are_checked(store, monkeypatch):
@@ -123,7 +146,7 @@ def test_settings_come_from_the_environment_and_are_checked(store, monkeypatch):
     assert "ENSEMBLE_REQUEST_RATE" in refused(store)
     monkeypatch.delenv("ENSEMBLE_REQUEST_RATE")
     with service(store, "--workers=0") as server:
-        answer = httpx.post(f"{server.url}/jobs", json={"preset": "doublet-shear", "ranks": 2})
+        answer = httpx2.post(f"{server.url}/jobs", json={"preset": "doublet-shear", "ranks": 2})
         assert answer.status_code == 422
         assert "at most 1" in answer.json()["detail"]
 

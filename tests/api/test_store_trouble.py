@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import shutil
+import sqlite3
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager
 from pathlib import Path
 
@@ -119,3 +121,19 @@ def test_a_full_disk_refuses_with_a_time_to_ask_again(tmp_path: Path) -> None:
 
 def test_an_error_without_words_has_a_reason() -> None:
     assert reason(TimeoutError()) == "TimeoutError"
+
+
+def test_a_file_that_is_locked_keeps_nobody_else_waiting(store: Path) -> None:
+    with Store.open(store) as opened:
+        key = opened.save(shear_run())
+    writer = sqlite3.connect(store / CATALOG, isolation_level=None)
+    with client_of(store) as client, ThreadPoolExecutor(1) as pool:
+        writer.execute("BEGIN EXCLUSIVE")
+        answer = pool.submit(client.get, f"/runs/{key}")
+        for _ in range(20):
+            assert client.get("/healthz").status_code == 200, "the lock is held for as long as this takes"
+            assert client.get("/jobs").status_code == 200
+        assert not answer.done()
+        writer.execute("ROLLBACK")
+        assert answer.result().status_code == 200
+    writer.close()

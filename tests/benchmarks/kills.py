@@ -25,7 +25,7 @@ from statistics import fmean
 from typing import Any
 from uuid import uuid4
 
-import httpx
+import httpx2
 import psutil
 
 from api.database.service_database import Database
@@ -134,19 +134,19 @@ class Load:
         body = {"preset": "doublet-shear", "set": changes, "ranks": 1 + number % 2}
         while True:
             try:
-                answer = httpx.post(
+                answer = httpx2.post(
                     f"{self._address}/jobs", json=body, headers={"Idempotency-Key": f"job-{number}"}
                 )
                 return str(answer.raise_for_status().json()["id"])
-            except httpx.TransportError:
+            except httpx2.TransportError:
                 time.sleep(0.05)
 
     def _read(self) -> None:
         while not self._stop.is_set():
             try:
-                httpx.get(f"{self._address}/jobs").raise_for_status()
+                httpx2.get(f"{self._address}/jobs").raise_for_status()
                 self.reads += 1
-            except httpx.TransportError:
+            except httpx2.TransportError:
                 time.sleep(0.05)
 
 

@@ -4,8 +4,8 @@
 
 Jobs are submitted all the time, each with a key of its own.  ``database`` stops a PostgreSQL server and
 starts it again; ``frozen`` suspends its processes; ``disk`` fills the file system of the store, a small one
-in memory, and ``read-only`` mounts it so.  Several runs may go on beside each other: each has its own
-servers.  The figures are printed as JSON.  Mounting needs the rights of root.
+in memory, and ``read-only`` lets nothing be opened for writing there.  Several runs may go on beside each
+other: each has its own servers.  The figures are printed as JSON.  Mounting needs the rights of root.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from contextlib import AbstractContextManager, ExitStack, contextmanager
 from functools import partial
 from pathlib import Path
 
-import httpx
+import httpx2
 import psutil
 
 from api.jobs.job import Job, JobStatus
@@ -44,7 +44,7 @@ class Submitting:
     """A client that submits until told to stop, and asks again with the same key after every 503."""
 
     def __init__(self, started: StartedService) -> None:
-        self._http = httpx.Client(base_url=started.url, timeout=120)
+        self._http = httpx2.Client(base_url=started.url, timeout=120)
         self._stop = threading.Event()
         self.acknowledged: list[str] = []
         self.other_answers: list[str] = []
@@ -72,12 +72,12 @@ class Submitting:
     def _waiting(self) -> int:
         return len(self._insist("GET", "/jobs", params={"status": "accepted"}).json()["items"])
 
-    def _insist(self, method: str, path: str, **options: object) -> httpx.Response:
+    def _insist(self, method: str, path: str, **options: object) -> httpx2.Response:
         while True:
             answer = self._http.request(method, path, **options)  # type: ignore[arg-type]
             if answer.is_success:
                 return answer
-            if answer.status_code != httpx.codes.SERVICE_UNAVAILABLE or "retry-after" not in answer.headers:
+            if answer.status_code != httpx2.codes.SERVICE_UNAVAILABLE or "retry-after" not in answer.headers:
                 self.other_answers.append(f"{method} {path}: {answer.status_code} {answer.text[:200]}")
             time.sleep(0.2)
 
@@ -93,35 +93,14 @@ def stopped(server: postgresql.Server) -> Iterator[None]:
 
 
 @contextmanager
-def suspended(server: postgresql.Server) -> Iterator[None]:
-    """A server that says nothing."""
-    assert server.process is not None
-    main = psutil.Process(server.process.pid)
-    processes = [main, *main.children(recursive=True)]
-    for process in processes:
-        process.suspend()
-    try:
-        yield
-    finally:
-        for process in processes:
-            process.resume()
-
-
-@contextmanager
 def read_only(disk: Path) -> Iterator[None]:
-    """A disk that takes nothing, as a kernel leaves one after errors."""
-    # The change is refused as long as a file is open for writing, so it is asked for until none is.
-    _remount(disk, "ro")
+    """A disk on which nothing can be opened for writing. What is open already can be written to."""
+    # The kernel keeps a mount writable while a file on it is open for writing, so another is put over it.
+    subprocess.run(["mount", "--bind", "-o", "ro", disk, disk], check=True)
     try:
         yield
     finally:
-        _remount(disk, "rw")
-
-
-def _remount(disk: Path, mode: str) -> None:
-    wait_for(
-        lambda: subprocess.run(["mount", "-o", f"remount,{mode}", disk], capture_output=True).returncode == 0
-    )
+        subprocess.run(["umount", "--lazy", disk], check=True)
 
 
 def outages_of(kind: str, directory: Path, stack: ExitStack) -> tuple[Path, Outage]:
@@ -132,7 +111,7 @@ def outages_of(kind: str, directory: Path, stack: ExitStack) -> tuple[Path, Outa
             raise SystemExit("outages: PostgreSQL is not installed")
         server = stack.enter_context(postgresql.running(programs))
         os.environ["ENSEMBLE_DATABASE"] = server.new_database()
-        return directory / "store", partial({"database": stopped, "frozen": suspended}[kind], server)
+        return directory / "store", server.suspended if kind == "frozen" else partial(stopped, server)
     disk = stack.enter_context(small_disk(directory / "disk", ROOM))
     return disk / "store", partial({"disk": filled, "read-only": read_only}[kind], disk)
 

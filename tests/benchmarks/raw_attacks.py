@@ -21,7 +21,7 @@ from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-import httpx
+import httpx2
 import psutil
 
 from tests.api.services import StartedService, service
@@ -189,7 +189,7 @@ def main() -> None:
         threading.Thread(target=watch, daemon=True).start()
         with ThreadPoolExecutor(AT_ONCE) as pool:
             results = list(pool.map(lambda case: attack(server.port, *case), cases))
-        alive = httpx.get(f"{server.url}/runs", timeout=SECONDS).status_code == 200
+        alive = httpx2.get(f"{server.url}/runs", timeout=SECONDS).status_code == 200
         stop.set()
         after = memory(server)
         logged = server.logged()

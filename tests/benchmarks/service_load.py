@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
-import httpx
+import httpx2
 import psutil
 from sqlalchemy import insert
 
@@ -190,7 +190,7 @@ def main() -> None:
             "POST /jobs, each of another scene": POST + ANOTHER,
         }
         with server(store, workers=int(options.busy)) as (process, address):
-            listened = httpx.post(f"{address}/jobs", json=ENDLESS).raise_for_status().json()["id"]
+            listened = httpx2.post(f"{address}/jobs", json=ENDLESS).raise_for_status().json()["id"]
             time.sleep(SETTLE_SECONDS)
             with listening(address, f"/jobs/{listened}/events", options.listeners):
                 measured = {

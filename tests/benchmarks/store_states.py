@@ -22,7 +22,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import httpx
+import httpx2
 
 from ensemble.store import Store
 from tests.conftest import ENSEMBLE
@@ -197,8 +197,8 @@ def served(line: list[str], state: State) -> str:
         while process.poll() is None and time.monotonic() < deadline:
             found = re.search(r"running on (http://[\d.]+:\d+)", log.read_text())
             if found:
-                ready = httpx.get(f"{found[1]}/readyz", timeout=60).status_code
-                runs = len(httpx.get(f"{found[1]}/runs", timeout=60).json()["items"])
+                ready = httpx2.get(f"{found[1]}/readyz", timeout=60).status_code
+                runs = len(httpx2.get(f"{found[1]}/runs", timeout=60).json()["items"])
                 process.send_signal(signal.SIGTERM)
                 process.wait()
                 return f"{runs} runs, readyz {ready}"

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
-import httpx
+import httpx2
 import pytest
 from sqlalchemy import update
 
@@ -131,7 +131,7 @@ def test_only_the_whole_token_is_accepted(store):
         assert client.get("/jobs", headers=bearer(token)).status_code == 200
 
 
-def guess(client: httpx.Client, times: int, **headers: str) -> list[int]:
+def guess(client: httpx2.Client, times: int, **headers: str) -> list[int]:
     """Return the statuses of answers to so many invalid tokens."""
     answers = [client.get("/jobs", headers=bearer(f"guess.{number}") | headers) for number in range(times)]
     assert all(0 < int(each.headers["retry-after"]) <= 60 for each in answers if each.status_code == 429)
@@ -193,8 +193,8 @@ def test_a_service_stays_closed_after_its_last_token_was_revoked(store):
     with serving(store) as address:
         token = make_token(store, "ada", TokenScope.ADMIN)
         revoke(store, token)
-        assert httpx.get(f"{address}/jobs").status_code == 401
-        assert httpx.get(f"{address}/jobs", headers=bearer(token)).status_code == 401
+        assert httpx2.get(f"{address}/jobs").status_code == 401
+        assert httpx2.get(f"{address}/jobs", headers=bearer(token)).status_code == 401
     with client_of(store) as started_again:
         assert started_again.get("/jobs").status_code == 401
 
@@ -285,9 +285,9 @@ def test_the_command_creates_lists_and_revokes(ensemble: Run, store: Path):
     assert "ada" in listed
     assert token.split(".")[1] not in listed
     with serving(store) as address:
-        assert httpx.get(f"{address}/jobs", headers=bearer(token)).status_code == 200
+        assert httpx2.get(f"{address}/jobs", headers=bearer(token)).status_code == 200
         assert ensemble("token", "revoke", identifier, place).returncode == 0
-        assert httpx.get(f"{address}/jobs", headers=bearer(token)).status_code == 401
+        assert httpx2.get(f"{address}/jobs", headers=bearer(token)).status_code == 401
     assert identifier not in ensemble("token", "list", place).stdout
 
 

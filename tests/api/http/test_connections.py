@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from urllib.parse import urlsplit
 
-import httpx
+import httpx2
 import pytest
 
 from api.auth import TokenScope
@@ -102,7 +102,7 @@ def test_an_answer_that_is_not_read_ends_the_connection(address, kept):
 
 
 def test_an_answer_that_is_read_slowly_but_steadily_arrives_whole(address):
-    whole = httpx.get(f"{address}{LARGE.decode()}", headers={"Accept-Encoding": "identity"}).content
+    whole = httpx2.get(f"{address}{LARGE.decode()}", headers={"Accept-Encoding": "identity"}).content
     with connected(address) as connection:
         connection.sendall(b"GET %s HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n" % LARGE)
         received = bytearray()
@@ -137,7 +137,7 @@ def test_what_follows_a_head_is_limited_in_size(tmp_path, request_bytes, endless
 
 def test_requests_one_after_the_other_are_answered(address):
     """Limits of a request do not add up over the requests of a connection."""
-    with httpx.Client(base_url=address) as client:
+    with httpx2.Client(base_url=address) as client:
         for _ in range(50):
             body = {"preset": "doublet-shear", "set": {"flow.kind": "x" * 5000}}
             assert client.post("/estimate", json=body).status_code == 422
@@ -145,11 +145,11 @@ def test_requests_one_after_the_other_are_answered(address):
 
 def test_a_client_may_listen_for_longer_than_any_limit(store):
     with serving(store, **LIMITS, event_seconds=0.1) as address:
-        job = httpx.post(f"{address}/jobs", json={"preset": "doublet-shear"}, timeout=SECONDS).json()
+        job = httpx2.post(f"{address}/jobs", json={"preset": "doublet-shear"}, timeout=SECONDS).json()
         with connected(address) as connection:
             connection.sendall(f"GET /jobs/{job['id']}/events HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
             time.sleep(5 * LIMITS["answer_seconds"])
-            httpx.delete(f"{address}/jobs/{job['id']}", timeout=SECONDS)
+            httpx2.delete(f"{address}/jobs/{job['id']}", timeout=SECONDS)
             received = b""
             while b"dismissed" not in received:
                 received += connection.recv(65536)
@@ -165,7 +165,7 @@ def test_connections_that_do_nothing_leave_room_for_others(store):
             connection.sendall(HEALTH + b"Content-Length: 1000000\r\n\r\nx")
         headers = {"Authorization": f"Bearer {token}"}
         deadline = time.monotonic() + SECONDS
-        while httpx.get(f"{address}/jobs", headers=headers).status_code != 200:
+        while httpx2.get(f"{address}/jobs", headers=headers).status_code != 200:
             assert time.monotonic() < deadline
             time.sleep(0.1)
         for held in holding:

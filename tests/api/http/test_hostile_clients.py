@@ -7,7 +7,7 @@ import socket
 import time
 from collections.abc import Iterator
 
-import httpx
+import httpx2
 import pytest
 from sqlalchemy import Engine, event
 
@@ -22,24 +22,24 @@ JSON = {"Content-Type": "application/json"}
 SECONDS = 60  # far less on a machine that has nothing else to do
 
 
-def post(client: httpx.Client, content: bytes) -> httpx.Response:
+def post(client: httpx2.Client, content: bytes) -> httpx2.Response:
     return client.post("/jobs", content=content, headers=JSON)
 
 
-def assert_refused(response: httpx.Response, *statuses: int) -> None:
+def assert_refused(response: httpx2.Response, *statuses: int) -> None:
     assert response.status_code in statuses, response.text
     assert response.headers["content-type"] == "application/problem+json"
     assert response.json()["status"] == response.status_code
 
 
 @pytest.fixture(scope="module")
-def attacked(tmp_path_factory: pytest.TempPathFactory) -> Iterator[httpx.Client]:
+def attacked(tmp_path_factory: pytest.TempPathFactory) -> Iterator[httpx2.Client]:
     with client_of(tmp_path_factory.mktemp("attacked") / "store") as client:
         yield client
 
 
 @pytest.fixture
-def unharmed(attacked: httpx.Client) -> Iterator[httpx.Client]:
+def unharmed(attacked: httpx2.Client) -> Iterator[httpx2.Client]:
     """A client of a service that is checked after the test: it has no job and still answers."""
     yield attacked
     assert attacked.get("/jobs").json() == {"items": [], "next": None}
@@ -201,7 +201,7 @@ def test_filters_compare_with_finite_numbers(reading, number):
     assert_refused(reading.get("/runs", params={"where": f"flow.rate>{number}"}), 422)
 
 
-def raw(client: httpx.Client, *pieces: bytes, pause: float = 0.0) -> bytes:
+def raw(client: httpx2.Client, *pieces: bytes, pause: float = 0.0) -> bytes:
     """Send bytes unchanged, and return everything that is answered until the connection ends."""
     address = (client.base_url.host, client.base_url.port)
     with socket.create_connection(address, timeout=SECONDS) as connection:
@@ -251,7 +251,7 @@ def test_headers_of_answers_hold_nothing_that_a_client_sent(store):
         _send_injections(client)
 
 
-def _send_injections(submitting: httpx.Client) -> None:
+def _send_injections(submitting: httpx2.Client) -> None:
     made = submitting.post(
         "/jobs",
         json={"preset": "doublet-shear"},
@@ -384,7 +384,7 @@ def test_requests_are_counted_for_each_user(store):
     ada, bob = (make_token(store, user, TokenScope.READ) for user in ("ada", "bob"))
     with client_of(store, request_rate="5/minute") as client:
 
-        def ask(token: str) -> httpx.Response:
+        def ask(token: str) -> httpx2.Response:
             return client.get("/jobs", headers={"Authorization": f"Bearer {token}"})
 
         assert [ask(ada).status_code for _ in range(7)] == [200] * 5 + [429] * 2

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-import httpx
+import httpx2
 import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
@@ -27,7 +27,7 @@ def test_generated_requests_get_the_documented_answers(tmp_path, examples, least
 
 
 @pytest.fixture(scope="module")
-def paths(reading: httpx.Client) -> dict:
+def paths(reading: httpx2.Client) -> dict:
     return reading.get("/openapi.json").json()["paths"]
 
 

@@ -7,10 +7,11 @@ import threading
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-import httpx
+import httpx2
 import pytest
 
 from api.auth import TokenScope
@@ -19,6 +20,7 @@ from api.jobs.job import JobStatus
 from api.jobs.job_queue import Jobs
 from api.settings import Settings
 from ensemble.config.documents import load_scene, load_study, preset_names
+from tests.api.processes import wait_until
 from tests.api.servers import client_of, make_token, serving
 
 SECONDS = 600  # until an answer is given up
@@ -31,7 +33,7 @@ def queue(store: Path) -> Iterator[Jobs]:
         yield Jobs(database, store)
 
 
-def submit(client: httpx.Client, headers: dict[str, str] | None = None, **submission: Any) -> dict[str, Any]:
+def submit(client: httpx2.Client, headers: dict[str, str] | None = None, **submission: Any) -> dict[str, Any]:
     response = client.post("/jobs", json=submission, headers=headers)
     assert response.status_code == 202, response.text
     return response.json()
@@ -154,7 +156,7 @@ def test_an_unknown_job_is_not_found(submitting):
     assert submitting.delete(f"/jobs/{'0' * 32}").status_code == 404
 
 
-def events(response: httpx.Response) -> Iterator[tuple[str, dict[str, Any]]]:
+def events(response: httpx2.Response) -> Iterator[tuple[str, dict[str, Any]]]:
     name = ""
     for line in response.iter_lines():
         field, _, value = line.partition(": ")
@@ -204,8 +206,8 @@ def test_only_its_owner_or_an_admin_dismisses_a_job(store):
     tokens = {user: make_token(store, user, scope) for user, scope in OWNERS.items()}
     with serving(store) as address:
 
-        def asking(user: str) -> httpx.Client:
-            return httpx.Client(base_url=address, headers={"Authorization": f"Bearer {tokens[user]}"})
+        def asking(user: str) -> httpx2.Client:
+            return httpx2.Client(base_url=address, headers={"Authorization": f"Bearer {tokens[user]}"})
 
         with asking("ada") as ada, asking("bob") as bob, asking("eve") as eve, asking("root") as root:
             job = submit(ada, preset="doublet-shear")
@@ -342,13 +344,40 @@ def test_a_service_whose_store_is_gone_is_alive_but_not_ready(store):
         assert response.headers["content-type"] == "application/problem+json"
 
 
+def test_the_streams_of_each_user_are_limited(store):
+    headers = {
+        user: {"Authorization": f"Bearer {make_token(store, user, TokenScope.SUBMIT)}"}
+        for user in ("ada", "bob")
+    }
+    with serving(store, event_streams=2, event_seconds=0.1) as address, ExitStack() as opened:
+
+        def opens(user: str) -> httpx2.Response:
+            asked = httpx2.stream("GET", f"{address}/jobs/{job}/events", headers=headers[user])
+            return opened.enter_context(asked)
+
+        work = {"preset": "doublet-shear"}
+        job = httpx2.post(f"{address}/jobs", json=work, headers=headers["ada"]).json()["id"]
+        first, second, third = (opens("ada") for _ in range(3))
+        assert (first.status_code, second.status_code, third.status_code) == (200, 200, 429)
+        assert "2 streams open" in json.loads(third.read())["detail"]
+        assert opens("bob").status_code == 200, "each user has a limit of his own"
+        missing = httpx2.get(f"{address}/jobs/{'0' * 32}/events", headers=headers["bob"])
+        assert missing.status_code == 404
+        first.close()
+        wait_until(lambda: opens("ada").status_code == 200)
+        # What ends by itself makes room, too.
+        httpx2.delete(f"{address}/jobs/{job}", headers=headers["ada"])
+        assert "dismissed" in second.read().decode()
+        wait_until(lambda: [opens("ada").status_code for _ in range(3)] == [200] * 3)
+
+
 def test_a_hundred_listeners_get_the_last_event(submitting, queue):
     job = submit(submitting, preset="doublet-shear")
     address = f"{submitting.base_url}/jobs/{job['id']}/events"
     listening = threading.Semaphore(0)
 
     def listen(_: int) -> str:
-        with httpx.stream("GET", address, timeout=SECONDS) as response:
+        with httpx2.stream("GET", address, timeout=SECONDS) as response:
             received = events(response)
             next(received)
             listening.release()

@@ -7,7 +7,7 @@ import socket
 import tracemalloc
 from pathlib import Path
 
-import httpx
+import httpx2
 import numpy as np
 import pytest
 
@@ -28,13 +28,13 @@ BINARY = {"Accept": "application/octet-stream"}
 
 
 @pytest.fixture
-def bound_run(filled_store: Path, reading: httpx.Client) -> str:
+def bound_run(filled_store: Path, reading: httpx2.Client) -> str:
     """Key of a run in which every quantity is present."""
     with Store.existing(filled_store) as store:
         return store.summaries(["flow.rate=0.75"])[0].key
 
 
-def found(client: httpx.Client, **query: object) -> list[dict]:
+def found(client: httpx2.Client, **query: object) -> list[dict]:
     response = client.get("/runs", params=query)
     assert response.status_code == 200, response.text
     return response.json()["items"]
