@@ -10,7 +10,6 @@ from sqlalchemy.exc import DatabaseError
 from ensemble.disk import locked
 from ensemble.errors import OtherVersionError, StoreInputError
 from ensemble.store.catalog import Catalog
-from ensemble.store.check import check_run
 from ensemble.store.listing import Listing
 from ensemble.store.recovery import Recovery
 from ensemble.store.sql_database import CATALOG, Place, is_file
@@ -56,22 +55,23 @@ def repair(path: Path, on_progress: OnProgress | None = None, processes: int = 1
         store = Store(path)
     with store, refused(path):
         done += store.recover()
-        total, damaged = store.count_runs(), []
+        total, damaged = store.count_runs(), {}
         found = run_problems(store.path, store.run_records(Listing(sort="created")), processes)
         for verified, (key, problems) in enumerate(found, start=1):
-            if problems or not (store.path / RUNS / key).is_dir():
-                damaged.append(key)
+            if problems:
+                damaged[key] = problems[0]
+            elif not (store.path / RUNS / key).is_dir():
+                damaged[key] = f"run {key}: its directory is missing"
             if on_progress is not None:
                 on_progress(verified, total)
-        for key in damaged:
-            done.append(_set_aside(store, key))
+        done += [_set_aside(store, key, problem) for key, problem in damaged.items()]
     return done
 
 
-def _set_aside(store: Store, key: str) -> str:
+def _set_aside(store: Store, key: str, problem: str) -> str:
     """Set a damaged run aside, unless it is only that this version cannot read its record."""
     try:
-        problem, *_ = check_run(store.path / RUNS / key, store.summary(key))
+        store.summary(key)
     except OtherVersionError as error:
         return f"{error}; left as it is"
     store.set_aside(key)

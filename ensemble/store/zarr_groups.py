@@ -23,6 +23,7 @@ from zarr.storage import LocalStore, ZipStore
 
 from ensemble.errors import StoreError
 from ensemble.store.run_record import NamedArray
+from ensemble.store.written_arrays import read_written
 from solver.analysis.run import Array
 
 ARCHIVE = "zarr.zip"
@@ -96,9 +97,9 @@ class StoredGroup:
         self.name = f"{kind} {directory.name}"
         archive = directory / ARCHIVE
         with self._opening():
-            is_archive = archive.exists()
-            self._members = Counter(_array_of_chunks(archive)) if is_archive else None
-            store = ZipStore(archive, mode="r") if is_archive else LocalStore(directory, read_only=True)
+            self._file = ZipFile(archive) if archive.exists() else None
+            self._members = None if self._file is None else Counter(_array_of_chunks(self._file))
+            store = LocalStore(directory, read_only=True) if self._file is None else ZipStore(archive)
             self._group = zarr.open_group(store, mode="r", zarr_format=3)
         self._arrays: dict[str, zarr.Array[Any]] = {}
         self.attributes = dict(self._group.attrs)
@@ -160,6 +161,9 @@ class StoredGroup:
         -------
         array
         """
+        written = None if self._file is None else read_written(self._file, name)
+        if written is not None:
+            return written
         self._array(name)
         return self._read(name, ...)
 
@@ -204,11 +208,10 @@ class StoredGroup:
             raise StoreError(f"{place} cannot be decoded ({error})") from error
 
 
-def _array_of_chunks(archive: Path) -> Iterator[str]:
+def _array_of_chunks(archive: ZipFile) -> Iterator[str]:
     """Yield, for each chunk in an archive, the name of its array."""
     # zarr's own count mistakes the chunks of `center_distance` for some of `center` in an archive.
-    with ZipFile(archive) as file:
-        for member in file.namelist():
-            array, _, chunk = member.partition("/c/")
-            if chunk:
-                yield array
+    for member in archive.namelist():
+        array, _, chunk = member.partition("/c/")
+        if chunk:
+            yield array

@@ -10,7 +10,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, closing, nullcontext
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -28,6 +28,7 @@ from ensemble.config.run_key import run_key
 from ensemble.store import Store, StoreError, StoreInputError
 from ensemble.store.listing import ParameterRange
 from ensemble.store.run_record import RunSummary, arrays
+from ensemble.store.written_arrays import read_written
 from ensemble.store.zarr_groups import ARCHIVE
 from solver.analysis.run import Outcome, Run
 from solver.scene import Criteria, Numerics
@@ -503,3 +504,17 @@ def test_values_that_are_not_finite_are_reported_unless_the_run_failed(store: St
     store.save(failed_run())
     (problem,) = store.check()
     assert "tension holds values that are not finite" in problem
+
+
+def test_arrays_are_read_directly_as_they_are_written_and_equal_those_of_zarr(tmp_path: Path) -> None:
+    long = shear_run(samples=300_000, frames=3)  # of series with several chunks
+    with Store.open(tmp_path / "store") as store:
+        for run in (long, failed_run()):
+            key = store.save(run)
+            archive = store.path / "runs" / key / ARCHIVE
+            with ZipFile(archive) as file, closing(ZipStore(archive)) as zarr_store:
+                group = zarr.open_group(zarr_store, mode="r")
+                for name in group.array_keys():
+                    values = read_written(file, name)
+                    assert values is not None, name
+                    np.testing.assert_array_equal(values, group[name][...], strict=True)
