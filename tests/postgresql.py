@@ -60,8 +60,9 @@ class Server:
         try:
             yield
         finally:
-            for process in suspended:
-                process.resume()
+            for process in reversed(suspended):
+                with suppress(psutil.NoSuchProcess):  # it had ended, and only waited to be noticed
+                    process.resume()
 
     @property
     def data(self) -> Path:

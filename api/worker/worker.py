@@ -18,7 +18,7 @@ from typing import Concatenate, ParamSpec
 
 import tomli_w
 
-from api.jobs.job import JobStatus, Lease
+from api.jobs.job import Job, JobStatus, Lease
 from api.jobs.job_queue import Jobs
 from api.jobs.worker_identity import own_identity
 from api.worker.delays import growing_delay
@@ -77,6 +77,7 @@ class Worker:
         self._store = store
         self._memory = memory
         self._identity = own_identity()
+        self._has_seen_outage = False  # during the present attempt
 
     def run(self, stop: threading.Event) -> None:
         """Work until an event is set; a job that is not finished by then is given back.
@@ -109,6 +110,7 @@ class Worker:
     def _carry_out(self, lease: Lease, stop: threading.Event) -> None:
         job = lease.job
         log.info("job %s: attempt %d", job.id, job.attempts)
+        self._has_seen_outage = False
         try:
             command = mpirun_command(job.ranks, self._memory // job.ranks, self._arguments(lease))
         except OSError as error:
@@ -142,7 +144,17 @@ class Worker:
             if not self._is_still_ours(lease, process):
                 log.info("job %s: no longer this worker's", job.id)
                 return None
+            self._look_for_outage(job)
         return status
+
+    def _look_for_outage(self, job: Job) -> None:
+        """Note whether the store or its catalog cannot be used now."""
+        try:
+            self._store.require_usable()
+        except TROUBLE as error:
+            if not self._has_seen_outage:
+                log.warning("job %s: the store cannot be used (%s)", job.id, reason(error))
+            self._has_seen_outage = True
 
     def _is_still_ours(self, lease: Lease, process: Process) -> bool:
         """Renew a lease.  While the database is away nobody else can take the job, so it goes on."""
@@ -152,17 +164,22 @@ class Worker:
             return self._jobs.heartbeat(lease, int(100 * progress.fraction), progress.message)
         except TROUBLE as error:
             log.warning("job %s: goes on without the database (%s)", lease.job.id, reason(error))
+            self._has_seen_outage = True
             return True
 
     def _try_again_later(self, lease: Lease, stop: threading.Event, what: str) -> None:
         """Give a job back whose attempt has ended without an answer, or give it up."""
-        lease = lease.crashed()
         number = lease.job.attempts
+        self._look_for_outage(lease.job)
+        if self._has_seen_outage:  # which may have ended the attempt, and says nothing of the job
+            what += " in an outage"
+        else:
+            lease = lease.crashed()
         if lease.crashes >= MAXIMUM_CRASHES:
             self._log(lease).add(f"attempt {number} {what}; given up")
             self._give_up(lease, stop)
             return
-        seconds = growing_delay(lease.crashes, LONGEST_DELAY)
+        seconds = growing_delay(max(lease.crashes, 1), LONGEST_DELAY)
         message = f"attempt {number} {what}; tried again after {seconds:.1f} s"
         log.warning("job %s: %s", lease.job.id, message)
         self._log(lease).add(message)

@@ -324,6 +324,26 @@ def test_a_job_that_always_crashes_fails_with_the_end_of_its_log(jobs, worker, c
     assert "by SIGABRT" in done.message
 
 
+def test_outages_however_many_cost_no_job(jobs, worker, command, store, monkeypatch):
+    works, stop = worker
+    monkeypatch.setattr("api.worker.worker.growing_delay", lambda *_: 1e-3)
+    monkeypatch.setattr("api.worker.worker.HEARTBEAT_SECONDS", 0.02)
+    job = submit(jobs, QUICK_SCENE)
+    catalog, elsewhere = store / "catalog.sqlite", store.with_name("elsewhere")
+    command(f"mv {catalog} {elsewhere}; sleep 0.3; mv {elsewhere} {catalog}; exit 2")
+    thread = threading.Thread(target=works.run, args=(stop,))
+    thread.start()
+    try:
+        wait_until(lambda: jobs.get(job.id).attempts > MAXIMUM_CRASHES + 1)
+        command(f"echo '{SEPARATED}'")
+        wait_until(finished(jobs, job))
+    finally:
+        stop.set()
+        thread.join()
+    assert jobs.get(job.id).status is JobStatus.SUCCEEDED
+    assert "attempt 1 ended with status 2 in an outage; tried again" in jobs.log_path(job).read_text()
+
+
 def test_a_job_that_needs_more_memory_than_it_may_have_says_so(launcher):
     large = ("--set=numerics.points=1024", "--set=vesicles.viscosity_contrast=4.0")
     command = mpirun_command(1, 300_000_000, ["run", "doublet-shear", *large, "--no-store", "--json"])
