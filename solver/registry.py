@@ -72,10 +72,12 @@ class Registry(Generic[M]):
         """Iterate over the registered models in the order of their registration."""
         return iter(tuple(self._models.values()))
 
-    def _validate(self, value: Any) -> M:
+    def _validate(self, value: Any, info: ValidationInfo) -> M:
         """Make a model from a document; an instance of a registered model stays as it is."""
+        if self._holds(value):
+            return value
         # Pydantic merges the errors of the model into those of the document around it.
-        return value if self._holds(value) else self._model_for(value).model_validate(value)
+        return self._model_for(value).model_validate(value, context=info.context)
 
     def _validate_strictly(self, value: Any, info: ValidationInfo) -> M:
         """Do as `_validate`, with no conversion between types but those from JSON."""
@@ -83,8 +85,9 @@ class Registry(Generic[M]):
             return value
         model = self._model_for(value)
         if info.mode == "json":
-            return model.model_validate_json(to_json(value, inf_nan_mode="constants"), strict=True)
-        return model.model_validate(value, strict=True)
+            text = to_json(value, inf_nan_mode="constants")
+            return model.model_validate_json(text, strict=True, context=info.context)
+        return model.model_validate(value, strict=True, context=info.context)
 
     def _holds(self, value: Any) -> TypeGuard[M]:
         return isinstance(value, tuple(self._models.values()))
@@ -109,7 +112,7 @@ class Registry(Generic[M]):
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         """Validate by looking the kind up; serialize as the model that a value is."""
         return core_schema.lax_or_strict_schema(
-            core_schema.no_info_plain_validator_function(self._validate),
+            core_schema.with_info_plain_validator_function(self._validate),
             core_schema.with_info_plain_validator_function(self._validate_strictly),
         )
 

@@ -36,7 +36,7 @@ FORBIDDEN = {
 # Folders and modules directly in each package, from the lowest.  Those of one line do not import each other.
 ORDER = {
     "solver": """
-        compilation memory model parallel registry revision roots
+        compilation dimensions memory model parallel registry revision roots
         flows pair_potentials
         scene
         membrane

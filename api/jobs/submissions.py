@@ -282,7 +282,7 @@ def read_submission(body: bytes) -> SubmissionFields:
             _limit_values(document.get("set"))
             for kind in kinds():
                 kind.check_size(document.get(kind.kind))
-        return Submission.model_validate_json(body, strict=True)
+        return Submission.model_validate_json(body, strict=True, context={})
     except ValidationError as error:
         errors = error.errors(include_url=False)[:MAXIMUM_FIELDS]
         raise BadInput(describe(errors, {})) from error

@@ -22,6 +22,7 @@ from ensemble.cli import (
     schema_command,
     steady_commands,
     store_commands,
+    units_command,
 )
 from ensemble.errors import BadInput, told_in_a_line
 from ensemble.mpi.world import only_first_rank_speaks, pin_threads
@@ -39,6 +40,7 @@ for _command in (
     *store_commands.COMMANDS,
     report_commands.report,
     preset_command.presets,
+    units_command.units,
     schema_command.schema,
 ):
     app.command()(_command)

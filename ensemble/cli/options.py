@@ -32,6 +32,15 @@ Changes = Annotated[
         "--set", metavar="PATH=VALUE", help="Change a field: dotted path and TOML value.  Repeatable."
     ),
 ]
+UnitsOf = Annotated[
+    str | None,
+    typer.Option(
+        "--units",
+        metavar="DOCUMENT",
+        help="Use the units of this TOML file instead of those that the record has.",
+        show_default=False,
+    ),
+]
 StorePath = Annotated[Path, typer.Option("--store", metavar="DIR", help="Directory of the store.")]
 NoStore = Annotated[bool, typer.Option("--no-store", help="Keep nothing.")]
 Filters = Annotated[

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -19,6 +20,7 @@ from ensemble.cli.options import (
     ProgressFormat,
     Sort,
     StorePath,
+    UnitsOf,
 )
 from ensemble.cli.printing import print_json, print_json_array, print_list, print_table
 from ensemble.config.defaults import DEFAULT_STORE, LISTED
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
     from ensemble.store import Store
     from ensemble.store.listing import Listing
     from ensemble.store.verification import OnProgress
+    from solver.scene import Units
 
 
 def _collections() -> list[str]:
@@ -99,12 +102,15 @@ def show(  # numpydoc ignore=PR01
             metavar="FILE", help="Draw it to this file: .png, .svg or .pdf, or a run's movie: .mp4 or .gif."
         ),
     ] = None,
+    units: UnitsOf = None,
     store: StorePath = DEFAULT_STORE,
     as_json: AsJson = False,
 ) -> None:
     """Print a run, a boundary or a branch of steady states, or draw it to a file."""
     with refusing(), _existing(store) as opened:
         answer = _stored(opened, name)
+        if units is not None:
+            answer = answer.in_units(_units_of(units))
         if output is not None:
             answer.draw(output)
         elif as_json:
@@ -185,6 +191,7 @@ def merge(  # numpydoc ignore=PR01
 def export(  # numpydoc ignore=PR01
     key: Annotated[str, typer.Argument(metavar="RUN", help="Key of the run or its beginning.")],
     file: Annotated[Path, typer.Argument(metavar="FILE", help="HDF5 file to write.")],
+    units: UnitsOf = None,
     store: StorePath = DEFAULT_STORE,
 ) -> None:
     """Write a run to a single HDF5 file."""
@@ -192,7 +199,16 @@ def export(  # numpydoc ignore=PR01
 
     with refusing(), _existing(store) as opened:
         key = opened.full_key(key)
-        export_run(opened.summary(key), opened.load(key), file)
+        summary = opened.summary(key)
+        if units is not None:
+            summary = summary.in_units(_units_of(units))
+        export_run(summary, replace(opened.load(key), scene=summary.scene), file)
+
+
+def _units_of(document: str) -> Units:
+    from ensemble.config.documents import load_units
+
+    return load_units(document)
 
 
 COMMANDS = (query, show, check, merge, export)

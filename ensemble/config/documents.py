@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 from ensemble.config.overrides import override, parse_override
 from ensemble.config.study import Study
 from ensemble.config.validation import nearest, validated
-from solver.scene import Model, Scene
+from solver.scene import Model, Scene, Units
 
 SomeDocument = TypeVar("SomeDocument", bound=Model)
 
@@ -195,3 +195,30 @@ def load_scene(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Scene
         If there is no such preset or file, or it is not a valid scene; names the field.
     """
     return load(Scene, name_or_path, dict(map(parse_override, overrides)))
+
+
+def load_units(name_or_path: str | Path) -> Units:
+    """Read the units of the scene of a document, whatever else it holds.
+
+    Parameters
+    ----------
+    name_or_path : str or Path
+        Name of a preset, else a TOML file.
+
+    Returns
+    -------
+    Units
+
+    Raises
+    ------
+    ValueError
+        If there is no such preset or file, or it has no valid units.
+    """
+    document = read_document(name_or_path)
+    scene = document.get("scene", document)
+    if not isinstance(scene, Mapping) or scene.get("units") is None:
+        raise ValueError(f"{name_or_path}: units — its scene has no such table")
+    try:
+        return validated(Units, scene["units"])
+    except ValueError as error:
+        raise ValueError(f"{name_or_path}: units: {error}") from error

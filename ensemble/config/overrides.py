@@ -16,8 +16,11 @@ from pydantic import TypeAdapter
 
 from ensemble.config.dotted_paths import is_array, locations
 from ensemble.config.validation import validated
+from solver.dimensions import is_quantity
 from solver.scene import Arrangement
 
+# Of two fields either one is given: to set one takes the other out.
+_EITHER = {"hamaker": "adhesion_energy", "adhesion_energy": "hamaker"}
 _BARE_WORD = re.compile(r"[A-Za-z_][\w.-]*")
 
 
@@ -28,7 +31,7 @@ def parse_override(text: str) -> tuple[str, Any]:
     ----------
     text : str
         For example ``flow.rate=0.5``, ``vesicles.0.center=[1.5, 0.0]`` or ``flow.kind=shear``.  The value is
-        TOML, or a bare word that stands for a string.
+        TOML, or a bare word or a number with a unit that stand for a string.
 
     Returns
     -------
@@ -40,7 +43,7 @@ def parse_override(text: str) -> tuple[str, Any]:
     Raises
     ------
     ValueError
-        If there is no ``=``, no path, or the value is neither TOML nor a bare word.
+        If there is no ``=``, no path, or the value is none of these.
     """
     path, equals, value = (part.strip() for part in text.partition("="))
     if not equals or not path:
@@ -48,7 +51,7 @@ def parse_override(text: str) -> tuple[str, Any]:
     try:
         parsed = tomllib.loads(f"value = {value}")
     except tomllib.TOMLDecodeError:
-        if _BARE_WORD.fullmatch(value):
+        if _BARE_WORD.fullmatch(value) or is_quantity(value):
             return path, value
         raise ValueError(f"{path}: {value!r} is not a TOML value") from None
     if parsed.keys() != {"value"}:
@@ -89,6 +92,8 @@ def override(document: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[st
                     node[key] = {}
                 node = node[key]
             node[last] = copy.deepcopy(value)
+            if last in _EITHER and isinstance(node, dict):
+                node.pop(_EITHER[last], None)
     return changed
 
 
@@ -100,7 +105,7 @@ def _list_vesicles(document: dict[str, Any], path: str) -> None:
             return
         if part == "vesicles" and part not in node and node.get("arrangement") is not None:
             try:
-                arrangement = validated(TypeAdapter(Arrangement), node.pop("arrangement"))
+                arrangement = validated(TypeAdapter(Arrangement), node.pop("arrangement"), node.get("units"))
             except ValueError as error:
                 raise ValueError(f"arrangement: {error}") from error
             node[part] = [vesicle.model_dump() for vesicle in arrangement.vesicles()]

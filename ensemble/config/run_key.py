@@ -21,11 +21,13 @@ def run_key(scene: Scene) -> str:
     Returns
     -------
     str
-        32 hexadecimal digits: SHA-256 of the canonical JSON (sorted keys) of the scene and of
-        `RESULTS_REVISION`.
+        32 hexadecimal digits: SHA-256 of the canonical JSON (sorted keys) of the scene, without its
+        units, and of `RESULTS_REVISION`.
     """
     # Adding 0.0 turns -0.0 into 0.0: the two compare equal, so equal scenes must not differ by it.
-    canonical = json.loads(scene.model_dump_json(), parse_float=lambda digits: float(digits) + 0.0)
+    canonical = json.loads(
+        scene.model_dump_json(exclude={"units"}), parse_float=lambda digits: float(digits) + 0.0
+    )
     identity = {"scene": canonical, "results_revision": RESULTS_REVISION}
     text = json.dumps(identity, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()[:32]

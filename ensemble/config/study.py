@@ -4,17 +4,31 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, Any, Self
 
-from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
+from pydantic import (
+    AfterValidator,
+    Field,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema, core_schema
 
 from ensemble.config.certifying_scene import certifying_scene
 from ensemble.config.dotted_paths import locations, value_at
 from ensemble.config.geometric_grid import GeometricGrid
+from ensemble.config.measured import dimension_at
 from ensemble.config.overrides import override
 from ensemble.config.validation import validated
 from solver.analysis.run import Outcome
+from solver.dimensions import Dimension, or_quantity
 from solver.scene import Model, Positive, Scene
 
 WITHOUT_ANSWER = (Outcome.UNDECIDED, Outcome.FAILED)
@@ -26,7 +40,43 @@ def _ascending(ends: tuple[float, float]) -> tuple[float, float]:
     return ends
 
 
-Interval = Annotated[tuple[Positive, Positive], AfterValidator(_ascending)]
+_SCENE = "scene"  # key of the validated scene in the context of a validation
+
+
+@dataclass(frozen=True)
+class _ValueOf:
+    """Metadata of a value of a parameter, which has that one's dimension.
+
+    Attributes
+    ----------
+    role : str
+        Key of the dimension in the context of a validation.
+    """
+
+    role: str
+
+    def remember(self, path: str, info: ValidationInfo) -> str:
+        """Keep the dimension of a parameter for the values that are validated after it."""
+        if info.context is not None and _SCENE in info.context:
+            info.context[self.role] = dimension_at(info.context[_SCENE], path)
+        return path
+
+    def _validate(self, value: Any, handler: Callable[[Any], Any], info: ValidationInfo) -> Any:
+        dimension: Dimension | None = (info.context or {}).get(self.role)
+        return handler(value) if dimension is None else dimension.validate(value, handler, info)
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.with_info_wrap_validator_function(self._validate, handler(source))
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        return or_quantity(handler(schema), handler.mode)
+
+
+_SEARCHED, _SWEPT = _ValueOf("searched"), _ValueOf("swept")
+_Searched = Annotated[Positive, _SEARCHED]
+Interval = Annotated[tuple[_Searched, _Searched], AfterValidator(_ascending)]
 
 
 class Guess(Model):
@@ -40,7 +90,7 @@ class Guess(Model):
         Values of the searched parameter between which the boundary is expected.
     """
 
-    at: float
+    at: Annotated[float, _SWEPT]
     bracket: Interval
 
 
@@ -76,6 +126,11 @@ class Search(Model):
     high: tuple[Outcome, ...] = Field(min_length=1)
     scan: int = Field(2, ge=0, le=100)
     certify: bool = False
+
+    @field_validator("parameter")
+    @classmethod
+    def _of_values_below(cls, parameter: str, info: ValidationInfo) -> str:
+        return _SEARCHED.remember(parameter, info)
 
     @field_validator("limits")
     @classmethod
@@ -124,7 +179,12 @@ class Sweep(Model):
     """
 
     parameter: str
-    values: tuple[float, ...] = Field(min_length=1)
+    values: tuple[Annotated[float, _SWEPT], ...] = Field(min_length=1)
+
+    @field_validator("parameter")
+    @classmethod
+    def _of_values_below(cls, parameter: str, info: ValidationInfo) -> str:
+        return _SWEPT.remember(parameter, info)
 
     @field_validator("values")
     @classmethod
@@ -143,17 +203,24 @@ class Study(Model):
         What the study and its boundary are called; at most 100 characters.
     scene : Scene
         The scene in which both parameters are varied.
-    search : Search
-        The critical value that is searched for at each value of the sweep.
     sweep : Sweep
-        The values at which it is searched for.
+        The values at which a critical value is searched for.
+    search : Search
+        That critical value.
     """
 
     # Without control characters: it is shown on terminals and in pages.
     name: Annotated[str, Field(min_length=1, max_length=100, pattern=r"^[^\x00-\x1f\x7f-\x9f]+$")]
     scene: Scene
-    search: Search
     sweep: Sweep
+    search: Search
+
+    @field_validator("scene")
+    @classmethod
+    def _whose_parameters_have_dimensions(cls, scene: Scene, info: ValidationInfo) -> Scene:
+        if info.context is not None:
+            info.context[_SCENE] = scene
+        return scene
 
     @model_validator(mode="after")
     def _parameters_fit_the_scene(self) -> Self:
@@ -188,8 +255,9 @@ class Study(Model):
 
     @cached_property
     def key(self) -> str:
-        """Key of the study: 16 hexadecimal digits of the SHA-256 of its canonical JSON."""
-        canonical = json.dumps(self.model_dump(mode="json"), sort_keys=True, separators=(",", ":"))
+        """Key of the study: 16 hexadecimal digits of the SHA-256 of its canonical JSON, without units."""
+        document = self.model_dump(mode="json", exclude={"scene": {"units"}})
+        canonical = json.dumps(document, sort_keys=True, separators=(",", ":"))
         return hashlib.sha256(canonical.encode()).hexdigest()[:16]
 
     def scene_at(self, sweep_value: float, value: float) -> Scene:

@@ -11,18 +11,24 @@ from pydantic import BaseModel, TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
 from ensemble.config.dotted_paths import Location, dotted, value_at
+from solver.dimensions import UNITS
+from solver.scene import Units
 
 Validated = TypeVar("Validated")
 SomeModel = TypeVar("SomeModel", bound=BaseModel)
 
 
 @overload
-def validated(model: type[SomeModel], document: Mapping[str, Any]) -> SomeModel: ...  # numpydoc ignore=GL08
+def validated(
+    model: type[SomeModel], document: Mapping[str, Any], units: Any = None
+) -> SomeModel: ...  # numpydoc ignore=GL08
 @overload
 def validated(
-    model: TypeAdapter[Validated], document: Mapping[str, Any]
+    model: TypeAdapter[Validated], document: Mapping[str, Any], units: Any = None
 ) -> Validated: ...  # numpydoc ignore=GL08
-def validated(model: type[BaseModel] | TypeAdapter[Any], document: Mapping[str, Any]) -> Any:
+def validated(
+    model: type[BaseModel] | TypeAdapter[Any], document: Mapping[str, Any], units: Any = None
+) -> Any:
     """Return what a document describes.
 
     Parameters
@@ -31,6 +37,8 @@ def validated(model: type[BaseModel] | TypeAdapter[Any], document: Mapping[str, 
         The model that the document has to fit.
     document : mapping
         Nested tables and arrays, as read from TOML.
+    units : mapping or None
+        The table ``units`` of the scene of which this is a part; a whole scene has its own.
 
     Returns
     -------
@@ -42,10 +50,11 @@ def validated(model: type[BaseModel] | TypeAdapter[Any], document: Mapping[str, 
     ValueError
         If the document does not fit the model; names the fields.
     """
+    context = {} if units is None else {UNITS: validated(Units, units)}
     try:
         if isinstance(model, TypeAdapter):
-            return model.validate_python(document)
-        return model.model_validate(document)
+            return model.validate_python(document, context=context)
+        return model.model_validate(document, context=context)
     except ValidationError as error:
         raise ValueError(explain(error, document) + _suggestions(error, model)) from error
 

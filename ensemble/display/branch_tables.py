@@ -26,11 +26,17 @@ def branch_table(summary: BranchSummary) -> Table:
     """
     headings = [summary.parameter, "", "outcome", "stable", "growth", "inclination", "gap"]
     table = Table(*(Column(heading, overflow="fold") for heading in headings), title=escape(summary.key))
-    for point in summary.branch:
-        table.add_row(*_cells(point, ""))
-    for name, points in (("fold", summary.folds), ("crossing", summary.crossings)):
-        for point in points:
-            table.add_row(*_cells(point, name))
+    rows = [
+        *((point, "") for point in summary.branch),
+        *((point, "fold") for point in summary.folds),
+        *((point, "crossing") for point in summary.crossings),
+    ]
+    measured = [summary.measured_value(point) for point, _ in rows]
+    has_units = any(value is not None for value in measured)
+    if has_units:
+        table.add_column(f"{summary.parameter} with its unit", overflow="fold")
+    for (point, name), value in zip(rows, measured, strict=True):
+        table.add_row(*_cells(point, name), *([str(value)] if has_units else []))
     return table
 
 

@@ -9,6 +9,7 @@ from rich.markup import escape
 from rich.table import Column, Table
 
 if TYPE_CHECKING:
+    from ensemble.config.measured import Measured
     from ensemble.search.boundary import Boundary, BoundaryPoint, OutcomeChange
     from ensemble.store.columns import ListColumn
 
@@ -110,20 +111,29 @@ def boundary_table(boundary: Boundary) -> Table:
     -------
     Table
     """
-    columns = boundary_columns(boundary.points)
-    table = Table(*map(_folded, columns), title=escape(boundary.name))
-    for point in boundary.points:
-        table.add_row(*boundary_cells(point, columns))
+    columns, measured = boundary_columns(boundary.points), boundary.measured()
+    units = {name.replace("_", " "): each.unit for of_point in measured for name, each in of_point.items()}
+    headings = [*columns, *(f"{name} ({unit})" for name, unit in units.items())]
+    table = Table(*map(_folded, headings), title=escape(boundary.name))
+    for point, of_point in zip(boundary.points, measured, strict=True):
+        values = {name.replace("_", " "): each.value for name, each in of_point.items()}
+        table.add_row(*boundary_cells(point, columns), *(_range(values.get(name)) for name in units))
     return table
 
 
-def fields_table(document: Mapping[str, Any]) -> Table:
+def _range(value: Any) -> str:
+    return " – ".join(map(_number, value)) if isinstance(value, list) else _number(value)
+
+
+def fields_table(document: Mapping[str, Any], measured: Mapping[str, Measured] | None = None) -> Table:
     """Return a table of a document, with a row for each of its fields; those of inner tables by dotted path.
 
     Parameters
     ----------
     document : mapping
         Nested tables, such as the results of a run.
+    measured : mapping of str to Measured, optional
+        The numbers with their units, by dotted path; if there are any, they are a column.
 
     Returns
     -------
@@ -131,7 +141,10 @@ def fields_table(document: Mapping[str, Any]) -> Table:
     """
     table = Table(show_header=False)
     for name, value in _leaves(document):
-        table.add_row(name, _number(value))
+        cells = [name, _number(value)]
+        if measured:
+            cells.append(str(measured[name]) if name in measured else "")
+        table.add_row(*cells)
     return table
 
 

@@ -13,17 +13,18 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ensemble.figures.style import BLACK, MARKS, STYLE, VERMILLION, WIDTH
-from ensemble.figures.symbols import describe, quantity
+from ensemble.figures.symbols import axis_label, describe, with_unit
 from ensemble.search.branch_summary import BranchPointRecord, BranchSummary
 from solver.analysis.run import Outcome
+from solver.dimensions import ENERGY_PER_DEPTH, LENGTH, RATE, Dimension
 
 Measured = Callable[[BranchPointRecord], float]
 
 # What is drawn against the parameter: the first of which all points have a value.
-_RESPONSES: tuple[tuple[str, Measured], ...] = (
-    ("inclination (degrees)", lambda point: _number(point.state.inclination_angle)),
-    ("gap, $d$", lambda point: _number(point.state.gap)),
-    ("bending energy, $E_b$", lambda point: point.state.energy.bending),
+_RESPONSES: tuple[tuple[str, Dimension | None, Measured], ...] = (
+    ("inclination (degrees)", None, lambda point: _number(point.state.inclination_angle)),
+    ("gap, $d$", LENGTH, lambda point: _number(point.state.gap)),
+    ("bending energy, $E_b$", ENERGY_PER_DEPTH, lambda point: point.state.energy.bending),
 )
 
 
@@ -42,13 +43,13 @@ def bifurcation_diagram(branches: Sequence[BranchSummary]) -> Figure:
         The group ids of its artists are ``stable``, ``unstable``, ``fold`` and ``crossing``.
     """
     first = branches[0]
-    x = quantity(first.parameter, first.scene.flow)
-    label, response = _response(branches)
+    label, dimension, response = _response(branches)
     figure = Figure(figsize=(WIDTH, 5.2), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
     upper.set_title(describe(first.scene, without=(first.parameter,)), pad=10)
-    upper.set_ylabel(label)
-    lower.set(xlabel=x.label, ylabel="fastest growth rate")
+    upper.set_ylabel(with_unit(label, dimension, first.scene))
+    lower.set_xlabel(axis_label(first.parameter, first.scene))
+    lower.set_ylabel(with_unit("fastest growth rate", RATE, first.scene))
     lower.axhline(0, color=BLACK, linewidth=0.6)
     for branch in branches:
         for axes, measured in ((upper, response), (lower, _fastest_growth)):
@@ -61,11 +62,11 @@ def bifurcation_diagram(branches: Sequence[BranchSummary]) -> Figure:
     return figure
 
 
-def _response(branches: Sequence[BranchSummary]) -> tuple[str, Measured]:
+def _response(branches: Sequence[BranchSummary]) -> tuple[str, Dimension | None, Measured]:
     points = [point for branch in branches for point in branch.branch]
     return next(
-        (label, measured)
-        for label, measured in _RESPONSES
+        (label, dimension, measured)
+        for label, dimension, measured in _RESPONSES
         if not any(math.isnan(measured(point)) for point in points)
     )
 

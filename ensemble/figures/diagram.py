@@ -11,12 +11,11 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from ensemble.figures.style import BLACK, GRAY, MARKS, STYLE, VERMILLION, WIDTH
-from ensemble.figures.symbols import Quantity, describe, quantity
+from ensemble.figures.symbols import Quantity, axis_label, describe, quantity
 from ensemble.search.boundary import Boundary, BoundaryPoint
 from ensemble.search.critical_value import SearchStatus
 from ensemble.search.line import Line, line_through
 from solver.analysis.run import Array, Outcome
-from solver.scene import Scene
 
 
 @matplotlib.rc_context(STYLE)
@@ -38,11 +37,11 @@ def phase_diagram(boundary: Boundary, runs: Sequence[tuple[float, float, Outcome
     """
     swept = boundary.study["sweep"]["parameter"]
     searched = boundary.study["search"]["parameter"]
-    scene = Scene.model_validate(boundary.study["scene"])
+    scene = boundary.scene
     x, y = quantity(swept, scene.flow), quantity(searched, scene.flow)
 
     figure = Figure(figsize=(WIDTH, 4.0), layout="constrained")
-    axes = figure.add_subplot(xlabel=x.label, ylabel=y.label)
+    axes = figure.add_subplot(xlabel=axis_label(swept, scene), ylabel=axis_label(searched, scene))
     axes.set_title(describe(scene, without=(swept, searched)), pad=10)
     _draw_runs(axes, runs)
     points = sorted(boundary.points, key=lambda point: point.parameters[swept])

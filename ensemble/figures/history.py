@@ -13,9 +13,10 @@ from ensemble.figures.membranes import add_tension_bar, extended_ends
 from ensemble.figures.panels import PANELS
 from ensemble.figures.snapshots import choose_snapshots, draw_snapshots
 from ensemble.figures.style import GRAY, STYLE, WIDTH
-from ensemble.figures.symbols import describe
+from ensemble.figures.symbols import describe, with_unit
 from solver.analysis.contacts import CONTACT
 from solver.analysis.run import Array, Run
+from solver.dimensions import TENSION, TIME
 
 # Heights in inches.
 _PANEL = 1.8
@@ -60,7 +61,8 @@ def run_figure(run: Run) -> Figure:
         snapshots.annotate(
             _CLUSTERS, (0, 0), (0, -2), "axes fraction", "offset points", va="top", fontsize="small"
         )
-    add_tension_bar(figure, membranes, snapshots, extended_ends(membranes))
+    bar = add_tension_bar(figure, membranes, snapshots, extended_ends(membranes))
+    bar.set_label(with_unit(r"tension $\sigma$", TENSION, run.scene))
 
     cells = grid[1].subgridspec(rows, columns)
     for position, (name, draw) in enumerate(panels.items()):
@@ -68,7 +70,7 @@ def run_figure(run: Run) -> Figure:
         axes = figure.add_subplot(cells[row, column], label=name)
         draw(axes, run)
         if row == rows - 1:
-            axes.set_xlabel("time $t$")
+            axes.set_xlabel(with_unit("time $t$", TIME, run.scene))
         for time in run.frames.time[choose_snapshots(run.frames)]:
             axes.axvline(time, color=GRAY, alpha=0.3, linewidth=0.7, zorder=0.5)
 

@@ -33,8 +33,9 @@ from ensemble.figures.membranes import (
 from ensemble.figures.panels import PANELS
 from ensemble.figures.snapshots import finite_frames
 from ensemble.figures.style import GRAY, INSIDE, STYLE, VERMILLION
-from ensemble.figures.symbols import describe
+from ensemble.figures.symbols import describe, with_unit
 from solver.analysis.run import Array, Frames, Run
+from solver.dimensions import TENSION, TIME
 from solver.flows import ImposedFlow
 
 _PACE = 8.0  # units of time a second: a doublet at shear rate 0.5 takes about five seconds a turn
@@ -168,7 +169,7 @@ class Picture:
             panel = self.figure.add_subplot(cells[row], label=name)
             PANELS[name](panel, run)
             self._cursors.append(panel.axvline(0.0, color=VERMILLION, linewidth=1.0))
-        panel.set_xlabel("time $t$")
+        panel.set_xlabel(with_unit("time $t$", TIME, run.scene))
 
         self.figure.draw_without_rendering()
         self.figure.set_layout_engine("none")  # or labels would shift from picture to picture
@@ -209,7 +210,8 @@ class Picture:
         self.membranes = membrane_lines(np.empty((0, 2, 2)), tension, tension_scale(tension), width)
         axes.add_collection(self._inside, autolim=False)
         axes.add_collection(self.membranes, autolim=False)
-        add_tension_bar(self.figure, self.membranes, axes, extended_ends(self.membranes), shrink=0.6)
+        bar = add_tension_bar(self.figure, self.membranes, axes, extended_ends(self.membranes), shrink=0.6)
+        bar.set_label(with_unit(r"tension $\sigma$", TENSION, self._scene))
         return axes
 
     def _freeze(self, moving: Collection[Artist]) -> None:

@@ -10,8 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MultipleLocator
 
 from ensemble.figures.style import BLACK, BLUE, GRAY, GREEN, VERMILLION
-from ensemble.figures.symbols import DISTANCE
+from ensemble.figures.symbols import DISTANCE, with_unit
 from solver.analysis.run import Run
+from solver.dimensions import ENERGY_PER_DEPTH, LENGTH
 
 _ANGLE_STEPS = (1, 2, 5, 10, 15, 30, 45, 90, 180, 360, 720)  # degrees between ticks
 _MOST_TICKS = 5
@@ -19,7 +20,7 @@ _MOST_TICKS = 5
 
 def _draw_gap(axes: Axes, run: Run) -> None:
     axes.plot(run.series["time"], run.series["gap"], color=BLACK)
-    axes.set(ylabel="gap", ylim=(0, None))
+    axes.set(ylabel=with_unit("gap", LENGTH, run.scene), ylim=(0, None))
     if run.scene.adhesion is not None:
         distance = run.scene.adhesion.distance
         axes.set_ylim(top=max(axes.get_ylim()[1], 1.05 * distance))
@@ -61,7 +62,7 @@ def _label_parts(axes: Axes) -> None:
 
 def _draw_energy(axes: Axes, run: Run) -> None:
     _draw_parts(axes, run, "bending_energy", "bending", "adhesion_energy")
-    axes.set_ylabel("energy")
+    axes.set_ylabel(with_unit("energy", ENERGY_PER_DEPTH, run.scene))
 
 
 def _draw_viscosity(axes: Axes, run: Run) -> None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass
 
+from ensemble.config.measured import Measured, dimension_at
+from solver.dimensions import Dimension
 from solver.flows import ImposedFlow
 from solver.scene import Scene
 
@@ -83,6 +85,42 @@ def quantity(path: str, flow: ImposedFlow | type[ImposedFlow] | None = None) -> 
     return _BY_PATH.get(path, Quantity(path, upright))
 
 
+def with_unit(label: str, dimension: Dimension | None, scene: Scene) -> str:
+    """Return the label of an axis, with the unit in which its numbers are, if it is known.
+
+    Parameters
+    ----------
+    label : str
+    dimension : Dimension or None
+        Of the numbers.
+    scene : Scene
+
+    Returns
+    -------
+    str
+        Such as ``gap (10 µm)``: where the axis says 2, the gap is 20 µm.
+    """
+    if scene.units is None or dimension is None or dimension.is_pure:
+        return label
+    return f"{label} ({Measured.of(1.0, dimension, scene.units)})"
+
+
+def axis_label(path: str, scene: Scene) -> str:
+    """Return the label of an axis that shows a parameter of a scene.
+
+    Parameters
+    ----------
+    path : str
+        Dotted path of the parameter.
+    scene : Scene
+
+    Returns
+    -------
+    str
+    """
+    return with_unit(quantity(path, scene.flow).label, dimension_at(scene, path), scene)
+
+
 def describe(scene: Scene, without: Collection[str] = ()) -> str:
     """Describe a scene in one line: its vesicles, its flow, and its parameters.
 
@@ -116,11 +154,19 @@ def describe(scene: Scene, without: Collection[str] = ()) -> str:
         f"in {scene.flow.title if scene.flow else 'quiescent fluid'}",
     ]
     parameters = [
-        f"${quantity(path, scene.flow).symbol}$ = {_numbers(numbers)}"
+        f"${quantity(path, scene.flow).symbol}$ = {_numbers(numbers)}{_in_units(path, numbers, scene)}"
         for path, numbers in values.items()
         if path not in without
     ]
     return ", ".join([" ".join(subject), *parameters])
+
+
+def _in_units(path: str, numbers: list[float], scene: Scene) -> str:
+    """Return a single number with its unit in brackets, if that is known."""
+    dimension = dimension_at(scene, path)
+    if scene.units is None or dimension is None or dimension.is_pure or len(numbers) > 1:
+        return ""
+    return f" ({Measured.of(numbers[0], dimension, scene.units)})"
 
 
 def _numbers(values: list[float]) -> str:

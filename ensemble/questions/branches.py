@@ -6,7 +6,7 @@ They start from the end of the scene's run, which a store may have already.
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from operator import itemgetter
@@ -14,11 +14,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ensemble.config.dotted_paths import parameter_value
+from ensemble.config.measured import Measured, measured_document, measured_fields
 from ensemble.config.overrides import override
 from ensemble.config.run_key import run_key
 from ensemble.config.validation import validated
 from ensemble.questions.question import Answer, StoredAnswer, StoredAnswers
-from solver.scene import LARGEST_DENSE, Scene
+from solver.dimensions import RATE, TIME
+from solver.scene import LARGEST_DENSE, Scene, Units
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -106,7 +108,8 @@ class BranchQuestion:
         with _opened(path) as store:
             key = branch_key(self.scene, self.parameter, self.to)
             if store is not None and store.branches.contains(key):
-                return _FollowedBranch(store.branches.summary(key), clock.perf_counter() - began)
+                summary = store.branches.summary(key).in_units(self.scene.units)
+                return _FollowedBranch(summary, clock.perf_counter() - began)
             near = _end_of_run(self.scene, store)
             if isinstance(near, str):
                 return _NoAnswer(near)
@@ -157,7 +160,9 @@ def steady_answer(scene: Scene, path: Path | None) -> Answer:
         state = find_steady_state(with_points(scene, near.tangent_angle.shape[1]), near)
     except NoSteadyStateError as error:
         return _NoAnswer(str(error))
-    return _SteadyAnswer(SteadyRecord.of(state).model_dump(mode="json"), run_key(scene))
+    record = SteadyRecord.of(state)
+    document = record.model_dump(mode="json")
+    return _SteadyAnswer(document, run_key(scene), measured_fields(record, document, scene.units))
 
 
 def settled_answer(scene: Scene, path: Path | None) -> Answer:
@@ -190,7 +195,13 @@ def settled_answer(scene: Scene, path: Path | None) -> Answer:
     except ArithmeticError as error:
         return _NoAnswer(str(error))
     record = {"outcome": run.outcome, "period": run.period} | breaking.record()
-    return _SteadyAnswer(record, run_key(scene))
+    dimensions = {"period": TIME, "growth_rate": RATE}
+    measured = {
+        name: Measured.of(record[name], dimension, scene.units)
+        for name, dimension in dimensions.items()
+        if scene.units is not None
+    }
+    return _SteadyAnswer(record, run_key(scene), measured)
 
 
 def revolves(scene: Scene) -> bool:
@@ -283,15 +294,19 @@ class _SteadyAnswer(Answer):
 
     record: dict[str, Any]
     key: str
+    measured: Mapping[str, Measured]
     complete: ClassVar[bool] = True
 
     def json_document(self) -> dict[str, Any]:
-        return {"failure": None} | self.record | {"run_key": self.key}
+        return self._document() | measured_document(self.measured)
 
     def table(self) -> Table:
         from ensemble.display.result_tables import fields_table
 
-        return fields_table(self.json_document())
+        return fields_table(self._document(), self.measured)
+
+    def _document(self) -> dict[str, Any]:
+        return {"failure": None} | self.record | {"run_key": self.key}
 
 
 @dataclass(frozen=True)
@@ -320,6 +335,9 @@ class _StoredBranch(StoredAnswer):
     """A branch of a store."""
 
     summary: BranchSummary
+
+    def in_units(self, units: Units) -> StoredAnswer:
+        return _StoredBranch(self.summary.in_units(units))
 
     def json_document(self) -> dict[str, Any]:
         return self.summary.document()

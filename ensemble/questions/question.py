@@ -18,7 +18,7 @@ from ensemble.config.documents import load
 from ensemble.config.overrides import override
 from ensemble.config.validation import validated
 from ensemble.questions.cost import Cost, total_cost
-from solver.scene import Model, Scene
+from solver.scene import Model, Scene, Units
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
@@ -98,6 +98,19 @@ class StoredAnswer(ABC):
     @abstractmethod
     def table(self) -> Table:
         """Return the answer as a table for people."""
+
+    @abstractmethod
+    def in_units(self, units: Units) -> StoredAnswer:
+        """Return the answer as if its scene had these units.
+
+        Parameters
+        ----------
+        units : Units
+
+        Returns
+        -------
+        StoredAnswer
+        """
 
     @abstractmethod
     def draw(self, output: Path) -> None:

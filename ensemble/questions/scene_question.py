@@ -5,15 +5,16 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ensemble.config.measured import Measured, measured_document, measured_fields
 from ensemble.config.run_key import run_key
 from ensemble.questions.question import Answer, Question, StoredAnswer, StoredAnswers, where_kept
 from ensemble.questions.size_limits import MOST_VESICLES, limit_vesicles
-from solver.scene import Scene
+from solver.scene import Scene, Units
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
@@ -123,7 +124,8 @@ class SceneQuestion(Question[Scene]):
 
         with nullcontext() if store is None else store_on_ranks(communicator, store) as opened:
             summary = single_run(communicator, self.document, opened, ranks_per_run, on_change)
-        return None if summary is None else _FinishedRun(summary, store)
+        # The run may have been made for a scene with other units.
+        return None if summary is None else _FinishedRun(summary.in_units(self.document.units), store)
 
     @classmethod
     def progress(cls, console: Console, for_program: bool) -> Display:
@@ -222,14 +224,40 @@ def run_document(summary: RunSummary) -> dict[str, Any]:
     Returns
     -------
     dict
-        A quantity that the scene does not have is None.
+        A quantity that the scene does not have is None.  Where the units of the scene are known, the
+        results in these are added as ``in_units``.
     """
     document = summary.document()
+    results = {name: document[name] for name in _RESULTS}
     return (
-        {name: document[name] for name in _RESULTS}
+        results
         | {name: document["work"][name] for name in _WORK}
         | {"run_key": summary.key, "results_revision": summary.results_revision}
+        | measured_document(measured_results(summary))
     )
+
+
+def measured_results(summary: RunSummary) -> dict[str, Measured]:
+    """Return the results of a run in the units of its scene.
+
+    Parameters
+    ----------
+    summary : RunSummary
+
+    Returns
+    -------
+    dict of str to Measured
+        By dotted path; empty if the units are not known.
+    """
+    document = summary.document()
+    results = {name: document[name] for name in _RESULTS}
+    return measured_fields(summary, results, summary.scene.units)
+
+
+def _table(document: dict[str, Any], measured: Mapping[str, Measured]) -> Table:
+    from ensemble.display.result_tables import fields_table
+
+    return fields_table({name: document[name] for name in document if name != "in_units"}, measured)
 
 
 @dataclass(frozen=True)
@@ -249,9 +277,7 @@ class _FinishedRun(Answer):
         return run_document(self.summary)
 
     def table(self) -> Table:
-        from ensemble.display.result_tables import fields_table
-
-        return fields_table(run_document(self.summary))
+        return _table(run_document(self.summary), measured_results(self.summary))
 
     @property
     def footer(self) -> str | None:
@@ -265,15 +291,19 @@ class _StoredRun(StoredAnswer):
     summary: RunSummary
     store: Store
 
+    def in_units(self, units: Units) -> StoredAnswer:
+        return _StoredRun(self.summary.in_units(units), self.store)
+
     def json_document(self) -> dict[str, Any]:
-        return self.summary.document()
+        document = self.summary.document()
+        return document | measured_document(measured_fields(self.summary, document, self.summary.scene.units))
 
     def table(self) -> Table:
         """Return the results and the cost of the run, and the scene that it is of."""
-        from ensemble.display.result_tables import fields_table
-
-        scene = self.summary.scene.model_dump(mode="json", exclude_none=True)
-        return fields_table(run_document(self.summary) | {"scene": scene})
+        scene = self.summary.scene
+        document = {"scene": scene.model_dump(mode="json", exclude_none=True)}
+        measured = measured_results(self.summary) | measured_fields(self.summary, document, scene.units)
+        return _table(run_document(self.summary) | document, measured)
 
     def draw(self, output: Path) -> None:
         """Draw what happened in the run, or its movie."""
@@ -282,7 +312,7 @@ class _StoredRun(StoredAnswer):
         from ensemble.figures.movie import MOVIE_SUFFIXES, save_movie
 
         suffix = suffix_among(output, (*FIGURE_SUFFIXES, *MOVIE_SUFFIXES))
-        run = self.store.load(self.summary.key)
+        run = replace(self.store.load(self.summary.key), scene=self.summary.scene)
         if suffix in MOVIE_SUFFIXES:
             save_movie(run, output)
         else:

@@ -22,7 +22,7 @@ from ensemble.questions.size_limits import (
     limit_elements,
     limit_vesicles,
 )
-from solver.scene import Scene
+from solver.scene import Scene, Units
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
@@ -270,7 +270,7 @@ class _TracedBoundary(Answer):
         boundary, usage = self.result.boundary, self.result.usage
         return {
             "study": boundary.name,
-            "boundary": [point.model_dump(mode="json") for point in boundary.points],
+            "boundary": boundary.point_documents(),
             "criteria": boundary.study["scene"]["criteria"],
             "wall_seconds": usage.wall_seconds,
             "busy_fraction": fmean(usage.busy_fractions) if usage.busy_fractions else None,
@@ -300,8 +300,11 @@ class _StoredBoundary(StoredAnswer):
     boundary: Boundary
     store: Store
 
+    def in_units(self, units: Units) -> StoredAnswer:
+        return _StoredBoundary(self.boundary.in_units(units), self.store)
+
     def json_document(self) -> dict[str, Any]:
-        return self.boundary.model_dump(mode="json")
+        return self.boundary.model_dump(mode="json") | {"points": self.boundary.point_documents()}
 
     def table(self) -> Table:
         from ensemble.display.result_tables import boundary_table

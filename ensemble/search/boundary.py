@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from ensemble.config.measured import Measured, dimension_at, measured_document
 from ensemble.timestamp import Timestamp
-from solver.scene import Numerics
+from solver.dimensions import Dimension
+from solver.scene import Numerics, Scene, Units
 
 BracketEnd = Annotated[float, Field(ge=0)] | None
 
@@ -162,3 +164,60 @@ class Boundary(BaseModel):
     name: str
     points: list[BoundaryPoint]
     updated: Timestamp
+
+    @property
+    def scene(self) -> Scene:
+        """The scene in which both parameters are varied."""
+        return Scene.model_validate(self.study["scene"])
+
+    def in_units(self, units: Units | None) -> Self:
+        """Return the boundary as if its scene had other units, or none.
+
+        Parameters
+        ----------
+        units : Units or None
+
+        Returns
+        -------
+        Boundary
+        """
+        scene = self.study["scene"] | {"units": None if units is None else units.model_dump(mode="json")}
+        return self.model_copy(update={"study": self.study | {"scene": scene}})
+
+    def measured(self) -> list[dict[str, Measured]]:
+        """Return the parameters, critical values and brackets in the units of the scene.
+
+        Returns
+        -------
+        list of dict of str to Measured
+            One for each point, by the names that they have there; without what has no unit.
+        """
+        scene = self.scene
+        if scene.units is None:
+            return [{} for _ in self.points]
+        searched = dimension_at(scene, self.study["search"]["parameter"])
+        measured = []
+        for point in self.points:
+            values: dict[str, tuple[Any, Dimension | None]] = {
+                name: (value, dimension_at(scene, name)) for name, value in point.parameters.items()
+            }
+            if point.critical_value is not None:
+                values |= {
+                    "critical_value": (point.critical_value, searched),
+                    "bracket": (point.bracket, searched),
+                }
+            measured.append(
+                {
+                    name: Measured.of(value, dimension, scene.units)
+                    for name, (value, dimension) in values.items()
+                    if dimension is not None and not dimension.is_pure
+                }
+            )
+        return measured
+
+    def point_documents(self) -> list[dict[str, Any]]:
+        """Return the points as JSON data, each with its values in the units of the scene, if it has any."""
+        return [
+            point.model_dump(mode="json") | measured_document(measured)
+            for point, measured in zip(self.points, self.measured(), strict=True)
+        ]

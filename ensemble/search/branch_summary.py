@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import json
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
 from pydantic import BaseModel, ConfigDict
 
+from ensemble.config.measured import Measured, dimension_at, measured_document, measured_fields
 from ensemble.timestamp import Timestamp
 from solver.analysis.run import Energy, Outcome, Viscosity
+from solver.dimensions import LENGTH, RATE
 from solver.revision import RESULTS_REVISION
-from solver.scene import Scene
+from solver.scene import Scene, Units
 
 if TYPE_CHECKING:
     from solver.simulation.steady_scenes import SteadyPoint, SteadyState
@@ -37,11 +39,11 @@ class SteadyRecord(BaseModel):
     stable: bool
     outcome: Outcome
     inclination_angle: float | None
-    gap: float | None
+    gap: Annotated[float | None, LENGTH]
     viscosity: Viscosity | None
     energy: Energy
     spatial_error: float
-    eigenvalues: tuple[tuple[float, float], ...]
+    eigenvalues: tuple[tuple[Annotated[float, RATE], Annotated[float, RATE]], ...]
 
     @classmethod
     def of(cls, state: SteadyState) -> Self:
@@ -137,10 +139,46 @@ class BranchSummary(BaseModel):
         """Return the summary as JSON data, each point with its results beside its value."""
         document = self.model_dump(mode="json", exclude={"branch", "folds", "crossings"})
         special = {
-            name: [point.document("value") for point in getattr(self, name)]
+            name: [self._point(point, "value") for point in getattr(self, name)]
             for name in ("folds", "crossings")
         }
-        return document | {"branch": [point.document("parameter") for point in self.branch]} | special
+        return document | {"branch": [self._point(point, "parameter") for point in self.branch]} | special
+
+    def measured_value(self, point: BranchPointRecord) -> Measured | None:
+        """Return the value of the parameter at a point in the units of the scene.
+
+        Parameters
+        ----------
+        point : BranchPointRecord
+
+        Returns
+        -------
+        Measured or None
+            None if it has no unit, or the units are not known.
+        """
+        dimension = dimension_at(self.scene, self.parameter)
+        if self.scene.units is None or dimension is None or dimension.is_pure:
+            return None
+        return Measured.of(point.value, dimension, self.scene.units)
+
+    def in_units(self, units: Units | None) -> Self:
+        """Return the branch as if its scene had other units, or none.
+
+        Parameters
+        ----------
+        units : Units or None
+
+        Returns
+        -------
+        BranchSummary
+        """
+        return self.model_copy(update={"scene": self.scene.model_copy(update={"units": units})})
+
+    def _point(self, point: BranchPointRecord, value_name: str) -> dict[str, Any]:
+        document = point.document(value_name)
+        measured = measured_fields(point.state, document, self.scene.units)
+        value = self.measured_value(point)
+        return document | measured_document(measured | ({} if value is None else {value_name: value}))
 
 
 def branch_key(scene: Scene, parameter: str, to: float | None) -> str:
@@ -158,7 +196,7 @@ def branch_key(scene: Scene, parameter: str, to: float | None) -> str:
         32 hexadecimal digits.
     """
     identity = {
-        "scene": json.loads(scene.model_dump_json()),
+        "scene": json.loads(scene.model_dump_json(exclude={"units"})),
         "parameter": parameter,
         "to": to,
         "results_revision": RESULTS_REVISION,

@@ -6,15 +6,17 @@ import json
 import platform
 from collections.abc import Callable, Mapping
 from importlib.metadata import version
-from typing import Any, NamedTuple, Self
+from typing import Annotated, Any, NamedTuple, Self
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from ensemble.config.run_key import DISTRIBUTION, run_key
 from ensemble.timestamp import Timestamp, now
+from solver.analysis.recorded import RECORDED
 from solver.analysis.run import Array, Energy, Errors, Frames, Outcome, Run, Viscosity, Work
+from solver.dimensions import LENGTH, TIME
 from solver.revision import RESULTS_REVISION
-from solver.scene import Scene
+from solver.scene import Scene, Units
 
 RESULT_PACKAGES = (DISTRIBUTION, "numpy", "scipy", "numba")
 
@@ -50,12 +52,12 @@ class RunSummary(BaseModel):
     outcome: Outcome
     failure: str | None
     undecided: str | None = None
-    time: float
-    period: float | None
+    time: Annotated[float, TIME]
+    period: Annotated[float | None, TIME]
     settled: bool | None = None
     effective_aspect_ratio: float | None
     inclination_angle: float | None
-    gap: float | None
+    gap: Annotated[float | None, LENGTH]
     viscosity: Viscosity | None
     energy: Energy
     error: Errors
@@ -63,7 +65,20 @@ class RunSummary(BaseModel):
     sensitive: bool = False
     series: tuple[str, ...]
     vesicle_series: tuple[str, ...] = ()
-    perturbations: tuple[float, ...] = ()
+    perturbations: tuple[Annotated[float, TIME], ...] = ()
+
+    def in_units(self, units: Units | None) -> Self:
+        """Return the summary of the same run with other units, or none, of its scene.
+
+        Parameters
+        ----------
+        units : Units or None
+
+        Returns
+        -------
+        RunSummary
+        """
+        return self.model_copy(update={"scene": self.scene.model_copy(update={"units": units})})
 
     @property
     def wall_seconds(self) -> float:
@@ -111,10 +126,13 @@ class NamedArray(NamedTuple):
     ----------
     dimensions : tuple of str
     values : array
+    attributes : dict
+        JSON data, such as the units.
     """
 
     dimensions: tuple[str, ...]
     values: Array
+    attributes: dict[str, Any] = {}  # noqa: RUF012  it is never changed
 
 
 # Dimension `frame_time` has a coordinate of its own name, as `time` has, so xarray indexes both.
@@ -137,6 +155,7 @@ def arrays(run: Run) -> dict[str, NamedArray]:
     -------
     dict of str to NamedArray
     """
+    units = run.scene.units
     frames = {
         "frame_time": run.frames.time,
         "tangent_angle": run.frames.tangent_angle,
@@ -148,11 +167,24 @@ def arrays(run: Run) -> dict[str, NamedArray]:
         name: NamedArray(("time", "vesicle", "axis")[: values.ndim], values)
         for name, values in run.vesicle_series.items()
     }
-    return (
+    named = (
         series
         | vesicle_series
         | {name: NamedArray(FRAME_DIMENSIONS[name], values) for name, values in frames.items()}
     )
+    return {name: array._replace(attributes=_attributes(name, units)) for name, array in named.items()}
+
+
+def _attributes(name: str, units: Units | None) -> dict[str, Any]:
+    """Return what an array measures and its units after the CF conventions, and those of the SI if known."""
+    recorded = RECORDED.get(name)
+    if recorded is None:
+        return {}
+    description, dimension = recorded
+    attributes = {"long_name": description, "units": dimension.symbol}
+    if units is None or dimension.is_pure:
+        return attributes
+    return attributes | {"si_units": dimension.si, "si_factor": units.scale(dimension)}
 
 
 def rebuild(summary: RunSummary, read: Callable[[str], Array]) -> Run:

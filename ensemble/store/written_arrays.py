@@ -26,7 +26,6 @@ WRITTEN: dict[str, Any] = {
         {"name": "bytes", "configuration": {"endian": "little"}},
         {"name": "zstd", "configuration": {"level": 3, "checksum": True}},
     ],
-    "attributes": {},
     "storage_transformers": [],
 }
 
@@ -74,6 +73,7 @@ def read_written(file: ZipFile, name: str) -> Array | None:
 def _layout(metadata: dict[str, Any]) -> tuple[tuple[int, ...], int]:
     """Return the shape of an array and the rows of a chunk; an error if it is of another form."""
     shape, names = tuple(metadata.pop("shape")), metadata.pop("dimension_names")
+    metadata.pop("attributes", None)  # descriptions and units
     grid = metadata.pop("chunk_grid")
     rows: int = grid["configuration"]["chunk_shape"][0]
     is_written = (

@@ -64,6 +64,7 @@ def _write_array(group: zarr.Group, name: str, array: NamedArray) -> None:
         # The checksum turns a flipped bit into an error instead of a different number.
         compressors=ZstdCodec(level=3, checksum=True),
         dimension_names=array.dimensions,
+        attributes=array.attributes,
         fill_value=float("nan"),
         # Every chunk is written, so a missing one is a loss and never an array of fill values.
         config={"write_empty_chunks": True},

@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from solver.dimensions import ENERGY_PER_DEPTH, TIME
+
 if TYPE_CHECKING:
     from solver.scene import Scene
 
@@ -67,8 +69,8 @@ class Energy:
         ∫∫φ ds ds over all pairs of vesicles; None without adhesion.
     """
 
-    bending: float
-    adhesion: float | None
+    bending: Annotated[float, ENERGY_PER_DEPTH]
+    adhesion: Annotated[float | None, ENERGY_PER_DEPTH]
 
 
 LARGEST_SPATIAL = 1e-3
@@ -112,10 +114,10 @@ class Errors:
     temporal: float
     spatial: float
     global_: Annotated[float | None, Field(alias="global")] = None
-    period: float | None = None
+    period: Annotated[float | None, TIME] = None
     inclination_angle: float | None = None
     viscosity: float | None = None
-    time: float | None = None
+    time: Annotated[float | None, TIME] = None
 
 
 @dataclass(frozen=True)
@@ -148,7 +150,8 @@ class Work:
     tension_iterations: int | None = None
 
 
-# Diagnostics by name, each of shape (time,) and sampled at `Series["time"]`.  Always present: time,
+# Diagnostics by name, each of shape (time,) and sampled at `Series["time"]`; `solver.analysis.recorded` says
+# what they measure and in which units.  Always present: time,
 # bending_energy, area_error, closure_error, state_rate.  With two or more vesicles: gap.  With exactly two:
 # center_distance, center_angle (of the line of centers, radians, unwrapped).  With adhesion:
 # adhesion_energy.  In shear: viscosity_bending_tension and, with adhesion, viscosity_adhesion and, with a

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import ClassVar, NamedTuple
+from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.dimensions import RATE
 from solver.model import Model, NonNegative
 
 Array = NDArray[np.float64]
@@ -53,7 +54,7 @@ class ImposedFlow(Model, ABC):
     """
 
     kind: str
-    rate: NonNegative
+    rate: Annotated[NonNegative, RATE]
 
     title: ClassVar[str]
     symbols: ClassVar[Mapping[str, Symbol]]

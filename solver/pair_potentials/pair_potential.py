@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import Any, Self
+from typing import Annotated, Any, Self
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
+from solver.dimensions import ADHESION_ENERGY, HAMAKER, LENGTH, rounded
 from solver.model import Model, NonNegative, Positive
 from solver.pair_potentials.cutoff import truncate
+from solver.pair_potentials.flat_membranes import FlatMembranes, at_rest
 
 # φ/H and its first and second derivative by q = r².
 Derivatives = tuple[float, float, float]
@@ -29,6 +31,9 @@ class PairPotential(Model, ABC):
         Tells the registered potentials apart; a literal with itself as the default.
     hamaker : float
         H, the strength, energy/length²; the potential is proportional to it.
+    adhesion_energy : float or None
+        May be given instead of H: the energy per area that two flat membranes gain, energy/length².
+        Validation turns it into H; in a validated potential it is None.
     distance : float
         δ, where the potential is least: closer points repel each other, farther ones attract.
     cutoff : float or None
@@ -36,9 +41,11 @@ class PairPotential(Model, ABC):
     """
 
     kind: str
-    hamaker: NonNegative
-    distance: Positive
-    cutoff: Positive | None = None
+    # Required, unless the energy is given.
+    hamaker: Annotated[NonNegative, HAMAKER] = Field(default_factory=float)
+    adhesion_energy: Annotated[NonNegative, ADHESION_ENERGY] | None = Field(None, exclude=True)
+    distance: Annotated[Positive, LENGTH]
+    cutoff: Annotated[Positive, LENGTH] | None = None
 
     @property
     @abstractmethod
@@ -86,8 +93,25 @@ class PairPotential(Model, ABC):
             return derivatives
         return truncate(square, self.distance, self.cutoff, *derivatives)
 
+    @property
+    def flat_membranes(self) -> FlatMembranes:
+        """Two long parallel membranes that adhere; a ValueError if they do not keep a distance."""
+        return at_rest(self.evaluate, self.distance, self.cutoff)
+
     @model_validator(mode="after")
     def _cutoff_beyond_the_repulsion(self) -> Self:
         if self.cutoff is not None and self.cutoff <= self.distance:
             raise ValueError(f"cutoff must be more than the distance {self.distance}, got {self.cutoff}")
+        return self
+
+    @model_validator(mode="after")
+    def _one_strength(self) -> Self:
+        given = {"hamaker", "adhesion_energy"} & self.model_fields_set
+        if len(given) != 1:
+            raise ValueError("give either hamaker or adhesion_energy")
+        if self.adhesion_energy is not None:
+            # As in `Scene._drop_arrangement`: equal potentials are equal, however they were given.
+            object.__setattr__(self, "hamaker", rounded(self.adhesion_energy / self.flat_membranes.energy))
+            object.__setattr__(self, "adhesion_energy", None)
+            self.model_fields_set.symmetric_difference_update(("hamaker", "adhesion_energy"))
         return self

@@ -9,6 +9,7 @@ from solver.scene.numerics import Numerics
 from solver.scene.output import Output
 from solver.scene.scene import LARGEST_DENSE, Scene
 from solver.scene.start import Start
+from solver.scene.units import Units
 from solver.scene.vesicle import Vesicle
 
 __all__ = [
@@ -29,5 +30,6 @@ __all__ = [
     "Shear",
     "Start",
     "Trap",
+    "Units",
     "Vesicle",
 ]

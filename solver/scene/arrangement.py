@@ -12,6 +12,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
+from solver.dimensions import ANGLE, BENDING_MODULUS, LENGTH
 from solver.model import Model, Positive
 from solver.scene.distribution import Distribution, Normal, Uniform, ends, samples
 from solver.scene.ellipses import semi_axes
@@ -39,7 +40,7 @@ class Lattice(Model):
     kind: Literal["lattice"] = "lattice"
     columns: int = Field(ge=1, le=MOST_VESICLES)
     rows: int = Field(ge=1, le=MOST_VESICLES)
-    spacing: tuple[Positive, Positive]
+    spacing: tuple[Annotated[Positive, LENGTH], Annotated[Positive, LENGTH]]
     staggered: bool = False
     vesicle: Vesicle = Vesicle()
 
@@ -95,11 +96,11 @@ class Random(Model):
     count: int = Field(ge=1, le=MOST_VESICLES)
     area_fraction: float = Field(gt=0, lt=1)
     seed: int = Field(0, ge=0)
-    minimum_distance: Positive = 0.2
+    minimum_distance: Annotated[Positive, LENGTH] = 0.2
     reduced_area: Distribution = 0.9
-    length: Distribution = 2 * math.pi
-    angle: float | None = None
-    bending_modulus: Positive = 1.0
+    length: Annotated[Distribution, LENGTH] = 2 * math.pi
+    angle: Annotated[float, ANGLE] | None = None
+    bending_modulus: Annotated[Positive, BENDING_MODULUS] = 1.0
     viscosity_contrast: Positive = 1.0
 
     @field_validator("reduced_area")

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any
 
 from pydantic import Field, model_validator
 
+from solver.dimensions import LENGTH, RATE, TIME
 from solver.model import Model, Positive
 
 _FORMER = ("gap_growth",)
@@ -34,11 +35,11 @@ class Criteria(Model):
         Multiple of the horizon up to which an undecided pair runs on, in a flow where it may.
     """
 
-    separated_distance: Positive = 12.0
+    separated_distance: Annotated[Positive, LENGTH] = 12.0
     revolutions: int = Field(1, ge=1)
     settled_change: Positive = 0.01
-    steady_rate: Positive = 1e-5
-    steady_time: Positive = 5.0
+    steady_rate: Annotated[Positive, RATE] = 1e-5
+    steady_time: Annotated[Positive, TIME] = 5.0
     extensions: float = Field(4.0, ge=1)
 
     @model_validator(mode="before")

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
+from solver.dimensions import TIME
 from solver.model import Model, Positive
 
 
@@ -16,5 +19,5 @@ class Output(Model):
         Time between recorded states.
     """
 
-    interval: Positive = 0.5
-    frame_interval: Positive = 1.0
+    interval: Annotated[Positive, TIME] = 0.5
+    frame_interval: Annotated[Positive, TIME] = 1.0

@@ -6,10 +6,11 @@ viscosity 1; a length of 2π and a bending modulus of 1 are the defaults of a ve
 
 from __future__ import annotations
 
-from typing import Self
+from typing import Annotated, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
+from solver.dimensions import TIME, UNITS
 from solver.flows import Flow, ImposedFlow
 from solver.model import Model, Positive
 from solver.pair_potentials import Adhesion
@@ -19,6 +20,7 @@ from solver.scene.ellipses import overlapping_pair
 from solver.scene.numerics import Numerics
 from solver.scene.output import Output
 from solver.scene.start import Start
+from solver.scene.units import Units
 from solver.scene.vesicle import Vesicle
 
 # Vesicles up to which matrices over all points are kept.  Beyond, sums are faster (measured).
@@ -33,6 +35,8 @@ class Scene(Model):
 
     Attributes
     ----------
+    units : Units or None
+        What the units are, for numbers that are given or shown with a unit.  No result depends on them.
     horizon : float
         Time at which a run ends that is not decided before.
     arrangement : Arrangement or None
@@ -54,7 +58,8 @@ class Scene(Model):
         How often a run is recorded.
     """
 
-    horizon: Positive
+    units: Units | None = None
+    horizon: Annotated[Positive, TIME]
     arrangement: Arrangement | None = Field(None, exclude=True)
     vesicles: tuple[Vesicle, ...] = Field((), validate_default=True)
     adhesion: Adhesion | None = None
@@ -63,6 +68,13 @@ class Scene(Model):
     numerics: Numerics = Numerics()
     criteria: Criteria = Criteria()
     output: Output = Output()
+
+    @field_validator("units")
+    @classmethod
+    def _of_all_fields_below(cls, units: Units | None, info: ValidationInfo) -> Units | None:
+        if info.context is not None:
+            info.context[UNITS] = units
+        return units
 
     @field_validator("vesicles")
     @classmethod

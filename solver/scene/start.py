@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
+from solver.dimensions import ANGLE, TIME
 from solver.model import Model, Positive
 
 
@@ -20,5 +23,5 @@ class Start(Model):
     """
 
     relaxed: bool = False
-    horizon: Positive = 1000.0
-    tilt: float = 1e-3
+    horizon: Annotated[Positive, TIME] = 1000.0
+    tilt: Annotated[float, ANGLE] = 1e-3

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from typing import Annotated
 
 from pydantic import Field
 
+from solver.dimensions import ANGLE, BENDING_MODULUS, LENGTH
 from solver.model import Model, Positive
 
 # A vesicle whose reduced area is less than this below 1 is circular: its curvature varies by 3e-5 at most.
@@ -32,11 +34,11 @@ class Vesicle(Model):
     """
 
     reduced_area: float = Field(0.9, gt=0, le=1)
-    length: Positive = 2 * math.pi
-    bending_modulus: Positive = 1.0
+    length: Annotated[Positive, LENGTH] = 2 * math.pi
+    bending_modulus: Annotated[Positive, BENDING_MODULUS] = 1.0
     viscosity_contrast: Positive = 1.0
-    center: tuple[float, float] = (0.0, 0.0)
-    angle: float = math.pi / 2
+    center: tuple[Annotated[float, LENGTH], Annotated[float, LENGTH]] = (0.0, 0.0)
+    angle: Annotated[float, ANGLE] = math.pi / 2
 
     @property
     def is_circle(self) -> bool:

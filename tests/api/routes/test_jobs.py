@@ -23,6 +23,7 @@ from ensemble.config.documents import load_scene, load_study, preset_names
 from tests.api.processes import wait_until
 from tests.api.servers import client_of, make_token, serving
 
+UNITS = {"radius": "10 um", "bending_modulus": "1e-19 J", "viscosity": "1 mPa*s"}
 SECONDS = 600  # until an answer is given up
 
 
@@ -71,6 +72,16 @@ def test_a_document_makes_the_same_job_as_its_preset(submitting, kind):
     assert given["id"] != named["id"]
 
 
+def test_a_scene_with_units_makes_the_same_job(submitting, queue):
+    scene = load_scene("doublet-shear").model_dump(mode="json")
+    measured = scene | {"units": UNITS, "flow": {"kind": "shear", "rate": "0.05 1/s"}}
+    given = submit(submitting, scene=measured)
+    changed = submit(submitting, preset="doublet-shear", set={"units": UNITS, "flow.rate": "3 1/min"})
+    assert given["key"] == changed["key"] == submit(submitting, preset="doublet-shear")["key"]
+    document = queue.document(queue.get(given["id"]))
+    assert (document["units"], document["flow"]["rate"]) == (UNITS, 0.5)
+
+
 @pytest.mark.parametrize(
     ("submission", "named"),
     [
@@ -83,6 +94,8 @@ def test_a_document_makes_the_same_job_as_its_preset(submitting, kind):
         ({"preset": "doublet-shear", "set": {"vesicles.7.angle": 1}}, "vesicles.7"),
         ({"preset": "doublet-shear", "set": {"flow.rate": [1]}}, "flow.rate"),
         ({"scene": {"horizon": "100", "vesicles": [{}]}}, "scene.horizon"),
+        ({"scene": {"units": UNITS, "horizon": "3 m", "vesicles": [{}]}}, "such as '0.5 s'"),
+        ({"scene": {"horizon": "3 s", "vesicles": [{}]}}, "scene.horizon: '3 s' — a unit needs the table"),
         ({"scene": {"horizon": 100, "vesicles": [{}, {}]}}, "vesicles 0 and 1 overlap"),
         ({"preset": "doublet-shear", "ranks": 0}, "ranks"),
         ({"preset": "doublet-shear", "ranks": 1.5}, "ranks"),

@@ -14,7 +14,7 @@ from ensemble.figures.style import MARKS
 from ensemble.figures.symbols import describe
 from ensemble.search.boundary import Boundary, BoundaryPoint
 from solver.analysis.run import Outcome
-from solver.scene import Scene, Vesicle
+from solver.scene import Scene, Units, Vesicle
 from tests.ensemble.made_runs import artist, scene
 
 
@@ -50,6 +50,16 @@ def point(sweep: float, critical: float, **fields: Any) -> BoundaryPoint:
 
 SHEAR_RATE = r"shear rate, $\dot{\gamma}$"
 EXTENSION_RATE = r"extension rate, $\dot{\epsilon}$"
+
+
+UNITS = Units(radius="10 um", bending_modulus="1e-19 J", viscosity="1 mPa*s")
+
+
+def test_axes_say_what_their_units_are_if_they_are_known() -> None:
+    axes = phase_diagram(boundary([point(1.0, 0.7)]).in_units(UNITS), []).axes[0]
+    assert axes.get_xlabel() == f"{SHEAR_RATE} (0.1 1/s)"
+    assert axes.get_ylabel().endswith(" (100 µPa)")
+    assert r"$\delta$ = 0.4 (4 µm)" in axes.get_title()
 
 
 def test_every_run_is_one_mark_of_its_outcome() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterator
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 import pytest
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from solver.analysis.run import Outcome
+from solver.dimensions import LENGTH
 from solver.flows import FLOWS, ImposedFlow, Symbol
 from solver.membrane.geometry import Membranes
 from solver.membrane.symmetry import has_images
@@ -29,7 +30,7 @@ class Poiseuille(ImposedFlow):
     """Velocity rate·(w − y²/w, 0): fastest at y = 0, so that it is not odd."""
 
     kind: Literal["added-poiseuille"] = "added-poiseuille"
-    half_width: Positive = 5.0
+    half_width: Annotated[Positive, LENGTH] = 5.0
 
     title = "Poiseuille flow"
     symbols = {"rate": Symbol("shear rate", r"\dot{\gamma}", "γ̇")}  # noqa: RUF012  as in its base
