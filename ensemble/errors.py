@@ -7,6 +7,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import ClassVar
 
+# Of a job that was asked to end and has kept what it was doing: the same command goes on (EX_TEMPFAIL).
+SUSPENDED_STATUS = 75
+
 # What is answered where a disk, a quota or the largest size of a file is reached.
 FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 
@@ -46,15 +49,16 @@ class Interrupted(BaseException):
 
     Parameters
     ----------
-    number : int
-        The signal.
+    status : int
+        With which the process ends: 128 and the number of the signal that ended it at once, or
+        `SUSPENDED_STATUS`.
     """
 
     latest: ClassVar[Interrupted | None] = None
 
-    def __init__(self, number: int) -> None:
-        super().__init__(number)
-        self.status = 128 + number
+    def __init__(self, status: int) -> None:
+        super().__init__(status)
+        self.status = status
         Interrupted.latest = self
 
 

@@ -1,4 +1,8 @@
-"""How a command ends when a signal stops it: one line, and status 128 and the signal's number."""
+"""How a command ends when a signal stops it.
+
+One that makes runs for a store keeps them after their next steps and ends with `SUSPENDED_STATUS`.  Every
+other one, and this one at the second signal, ends at once with the status 128 and the signal's number.
+"""
 
 from __future__ import annotations
 
@@ -12,9 +16,10 @@ import time
 from types import FrameType
 
 from ensemble.errors import Interrupted
-from ensemble.mpi.world import has_joined, is_launched, launched_rank, launched_size
+from ensemble.mpi.end_requests import EndRequests
+from ensemble.mpi.world import has_joined, is_launched, launched_rank, launched_size, tell
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGUSR1)
 UNWINDING_SECONDS = 1.0
 PARENT_CHECK_SECONDS = 0.2
 LAUNCHER_CONNECTION = "PMI_FD"  # number of the open socket to the launcher's helper, where there is one
@@ -25,11 +30,11 @@ SHOW_CURSOR = "\x1b[?25h"  # a progress display hides it
 
 
 def end_with_one_line() -> None:
-    """Make SIGINT and SIGTERM end this process within two seconds, whatever it is doing.
+    """Make signals end this process: a run in progress after its next step, everything else at once.
 
-    Alone, the process unwinds: `Interrupted` is raised, and what it was writing is removed.  If a thread
-    keeps it, or a library swallows the exception, it is ended after `UNWINDING_SECONDS`.  What libraries
-    print on the way is not shown.
+    At once means within two seconds.  Alone, the process unwinds: `Interrupted` is raised, and what it was
+    writing is removed.  If a thread keeps it, or a library swallows the exception, it is ended after
+    `UNWINDING_SECONDS`.  What libraries print on the way is not shown.
 
     Under an MPI launcher the main thread may be inside a collective that never returns, because another rank
     has ended already.  So there another thread ends the process at once.  Nothing is lost by that: a run
@@ -37,7 +42,7 @@ def end_with_one_line() -> None:
     """
     if launched_size() == 1:
         for number in SIGNALS:
-            signal.signal(number, _unwind)
+            signal.signal(number, _interrupt)
         return
     reader, writer = os.pipe()
     os.set_blocking(writer, False)
@@ -91,8 +96,13 @@ def _is_cut_off() -> bool:
     return any(event & select.POLLHUP for _, event in connection.poll(0))
 
 
-def _unwind(number: int, _: FrameType | None) -> None:
-    interruption = Interrupted(number)
+def _interrupt(number: int, _: FrameType | None) -> None:
+    if not EndRequests.ask():
+        _unwind(128 + number)
+
+
+def _unwind(status: int) -> None:
+    interruption = Interrupted(status)
     for again in SIGNALS:  # a second signal ends the process at once
         signal.signal(again, lambda *_: os._exit(interruption.status))
     _say_interrupted()
@@ -106,11 +116,13 @@ def _unwind(number: int, _: FrameType | None) -> None:
 
 def _end(reader: int) -> None:
     (number,) = os.read(reader, 1)
+    while EndRequests.ask():
+        (number,) = os.read(reader, 1)
     _say_interrupted()
     if not has_joined():
         # The other ranks would wait for this one, and the launcher ends them only if a signal has ended it.
         os.kill(os.getpid(), signal.SIGKILL)
-    os._exit(Interrupted(number).status)
+    os._exit(128 + number)
 
 
 def _say_interrupted() -> None:
@@ -118,9 +130,5 @@ def _say_interrupted() -> None:
     # The stream of the process: the command line may have put another one in its place.
     stream = sys.__stderr__
     if launched_rank() == 0 and stream is not None:
-        cursor = SHOW_CURSOR if stream.isatty() else ""
-        print(
-            f"{cursor}ensemble: interrupted; finished runs are kept and the same command goes on",
-            file=stream,
-            flush=True,
-        )
+        print(SHOW_CURSOR if stream.isatty() else "", file=stream, end="")
+        tell("interrupted; what is finished or has a checkpoint is kept, and the same command goes on")

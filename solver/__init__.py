@@ -11,11 +11,10 @@ if TYPE_CHECKING:
     from solver.analysis.run import Energy, Errors, Frames, Outcome, Run, Series, Viscosity, Work
     from solver.revision import RESULTS_REVISION
     from solver.scene import Scene
-    from solver.simulation.simulate import Cancelled, Simulation, simulate
+    from solver.simulation.simulate import Simulation, simulate
 
 __all__ = [
     "RESULTS_REVISION",
-    "Cancelled",
     "Energy",
     "Errors",
     "Frames",
@@ -31,7 +30,6 @@ __all__ = [
 
 _MODULES = {
     "RESULTS_REVISION": "solver.revision",
-    "Cancelled": "solver.simulation.simulate",
     "Scene": "solver.scene",
     "Simulation": "solver.simulation.simulate",
     "simulate": "solver.simulation.simulate",

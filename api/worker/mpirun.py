@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
 import threading
 from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, suppress
 from pathlib import Path
 from typing import IO
 
@@ -118,6 +119,19 @@ class Process(AbstractContextManager["Process"]):
         """Return the standard output so far."""
         self._output.seek(0)
         return self._output.read()
+
+    def suspend(self, seconds: float) -> None:
+        """Let the command keep its runs and end; kill it if that takes longer.
+
+        Parameters
+        ----------
+        seconds : float
+            Longest time to wait.
+        """
+        self._watcher.send_signal(signal.SIGTERM)
+        with suppress(subprocess.TimeoutExpired):
+            self._watcher.wait(seconds)
+        self.end()
 
     def end(self) -> None:
         """Kill the command and all of its descendants; none is left when this returns."""

@@ -5,7 +5,7 @@
 MPI launchers put their helpers and ranks into sessions of their own, so neither a signal to a group nor the
 end of the launcher reaches all of them.  This process stands between a worker and a launcher.  It adopts
 descendants that lose their parents, and kills until none is left.  The end of its standard input tells it
-that the worker is gone.
+that the worker is gone.  It passes SIGTERM on to the launcher.
 """
 
 from __future__ import annotations
@@ -27,7 +27,9 @@ PR_SET_CHILD_SUBREAPER = 36
 def main() -> None:
     """Run the command of the arguments and exit with its status, 128 and the signal if one ended it."""
     _control_process(PR_SET_CHILD_SUBREAPER, 1)
+    signal.signal(signal.SIGTERM, lambda *_: None)  # not to end while the launcher starts
     launcher = _start(sys.argv[1:])
+    signal.signal(signal.SIGTERM, lambda *_: launcher.send_signal(signal.SIGTERM))
     threading.Thread(target=_end_with_worker, name="worker-watch", daemon=True).start()
     status = launcher.wait()
     _kill_everything()

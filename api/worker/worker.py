@@ -2,7 +2,7 @@
 
 Only what a command prints as its answer, with the status of an answer, decides a job.  Every other end is
 trouble, and the job is tried again: its processes were killed, or the disk, the database or the memory failed
-them.  What is in the store is not run again.
+them.  What is in the store is not run again, and runs in progress go on from their checkpoints.
 """
 
 from __future__ import annotations
@@ -24,12 +24,14 @@ from api.jobs.worker_identity import own_identity
 from api.worker.delays import growing_delay
 from api.worker.job_log import JobLog
 from api.worker.mpirun import Process, mpirun_command
+from ensemble.errors import SUSPENDED_STATUS
 from ensemble.questions import INCOMPLETE_STATUS, kind_named
 from ensemble.store import Store
 from ensemble.store.sql_database import UNUSABLE, reason
 
 POLL_SECONDS = 0.5
 HEARTBEAT_SECONDS = 0.5
+SUSPENSION_SECONDS = 6.0  # for a job to keep its runs when its worker is stopped
 MAXIMUM_CRASHES = 8  # of a job at the same point
 LONGEST_DELAY = 128.0  # before a job is tried again, in seconds
 LONGEST_WAIT = 10.0  # before the database or the disk is tried again, in seconds
@@ -37,6 +39,7 @@ LONGEST_WAIT = 10.0  # before the database or the disk is tried again, in second
 # Exit statuses with which a command answers, and what becomes of the job.
 ANSWERS: Mapping[int, JobStatus] = {0: JobStatus.SUCCEEDED, INCOMPLETE_STATUS: JobStatus.FAILED}
 TROUBLE = (*UNUSABLE, OSError)
+_SUSPENDED = "asked to end; goes on from its checkpoints"
 
 Arguments = ParamSpec("Arguments")
 
@@ -124,6 +127,9 @@ class Worker:
             if result is not None:
                 self._finish(lease, stop, result)
                 return
+        if status == SUSPENDED_STATUS:
+            self._record(stop, self._jobs.give_back, lease.at(process.progress.reached), _SUSPENDED)
+            return
         self._try_again_later(lease.at(process.progress.reached), stop, f"ended {_in_words(status)}")
 
     def _wait(self, process: Process, lease: Lease, stop: threading.Event) -> int | None:
@@ -132,7 +138,7 @@ class Worker:
         deadline = time.monotonic() + job.seconds
         while (status := process.wait(HEARTBEAT_SECONDS)) is None:
             if stop.is_set():
-                process.end()
+                process.suspend(SUSPENSION_SECONDS)
                 message = "its worker was stopped; waiting for another one"
                 self._record(stop, self._jobs.give_back, lease.at(process.progress.reached), message)
                 return None

@@ -26,13 +26,13 @@ from ensemble.search.task_queue import RunAnswer, SomeTask, Task, TaskQueue
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
 
+    from ensemble.mpi.end_requests import EndRequests
     from ensemble.mpi.store_on_ranks import StoreOnRank
     from ensemble.store import Staged, Store
 
 _ORDERS = 1  # tag of messages to workers
 _REPORTS = 2  # tag of messages to the dispatcher
 _POLL_SECONDS = 0.002
-_CANCEL_CHECK_SECONDS = 0.02
 _PUBLISH_SECONDS = 0.5
 
 
@@ -47,6 +47,11 @@ class Cancel:
     """
 
     key: str
+
+
+@dataclass(frozen=True)
+class Suspend:
+    """Order: keep the run that is going on, if there is one, and stop it."""
 
 
 @dataclass(frozen=True)
@@ -79,8 +84,8 @@ class Finished:
 
 
 @dataclass(frozen=True)
-class Stopped:
-    """Report: a run was cancelled.
+class Unfinished:
+    """Report: a run was cancelled or suspended.
 
     Attributes
     ----------
@@ -91,8 +96,8 @@ class Stopped:
     seconds: float
 
 
-Order = Task | Cancel | Stop
-WorkerReport = Ready | Finished | Stopped
+DispatcherOrder = Task | Cancel | Suspend | Stop
+WorkerReport = Ready | Finished | Unfinished
 
 
 @dataclass(frozen=True)
@@ -143,8 +148,8 @@ def _lead(groups: Groups, leaders: Intracomm, store: StoreOnRank) -> None:
     _send(leaders, Ready(), 0, _REPORTS)
     while True:
         order = _wait(leaders)
-        # A cancellation that crossed the report of the run it names has nothing left to stop.
-        if isinstance(order, Cancel):
+        # An order that crossed the report of the run that it means has nothing left to stop.
+        if isinstance(order, Cancel | Suspend):
             continue
         for follower in groups.followers:
             _send(groups.group, order, follower, _ORDERS)
@@ -154,49 +159,41 @@ def _lead(groups: Groups, leaders: Intracomm, store: StoreOnRank) -> None:
 
 
 def _follow(groups: Groups) -> None:
-    from solver.simulation.simulate import Cancelled, simulate
+    from ensemble.mpi.checkpointed_run import Stopped, checkpointed_run
 
     while isinstance(order := _wait(groups.group), Task):
-        with suppress(Cancelled):
-            simulate(order.scene, parallel=groups.parallel)
+        with suppress(Stopped):
+            checkpointed_run(order.scene, groups.parallel, None)
 
 
-def _wait(communicator: Intracomm) -> Order:
+def _wait(communicator: Intracomm) -> DispatcherOrder:
     while (received := _receive(communicator, _ORDERS)) is None:
         time.sleep(_POLL_SECONDS)
-    return cast(Order, received[0])
+    return cast(DispatcherOrder, received[0])
 
 
 def _simulate(groups: Groups, leaders: Intracomm, store: StoreOnRank, task: Task) -> WorkerReport:
     # A study whose answers are all in the store never needs the compiled kernels.
-    from solver.simulation.simulate import Cancelled, simulate
+    from ensemble.mpi.checkpointed_run import CheckpointKeeper, Order, Stopped, checkpointed_run
+
+    def order() -> Order:
+        # While a run goes on nobody orders another one; a cancellation may be late and name an earlier run.
+        while (received := _receive(leaders, _ORDERS)) is not None:
+            if received[0] == Cancel(task.key):
+                return Order.CANCEL
+            if received[0] == Suspend():
+                return Order.SUSPEND
+        return Order.GO_ON
 
     begin = time.perf_counter()
     try:
-        run = simulate(task.scene, parallel=groups.parallel, should_stop=_Cancellation(leaders, task.key))
-    except Cancelled:
-        return Stopped(time.perf_counter() - begin)
+        run = checkpointed_run(
+            task.scene, groups.parallel, CheckpointKeeper(store.checkpoint(task.scene), order)
+        )
+    except Stopped:
+        return Unfinished(time.perf_counter() - begin)
     seconds = time.perf_counter() - begin
     return Finished(store.stage(run), RunAnswer(run.outcome, run.sensitive), seconds)
-
-
-class _Cancellation:
-    """Whether a run has been cancelled; looks for messages only every few steps."""
-
-    def __init__(self, communicator: Intracomm, key: str) -> None:
-        self._communicator = communicator
-        self._key = key
-        self._next_check = 0.0
-
-    def __call__(self) -> bool:
-        if time.monotonic() < self._next_check:
-            return False
-        self._next_check = time.monotonic() + _CANCEL_CHECK_SECONDS
-        # While a run goes on, the only orders are cancellations; one may be late and name an earlier run.
-        while (received := _receive(self._communicator, _ORDERS)) is not None:
-            if received[0] == Cancel(self._key):
-                return True
-        return False
 
 
 class Dispatcher(Generic[SomeTask]):
@@ -215,6 +212,8 @@ class Dispatcher(Generic[SomeTask]):
         and at the end.
     meter : UsageMeter
         Measures what the groups do.
+    requests : EndRequests
+        Whether the job is asked to end.
     """
 
     def __init__(
@@ -224,25 +223,35 @@ class Dispatcher(Generic[SomeTask]):
         store: Store,
         on_change: Callable[[JobProgress[SomeTask]], None],
         meter: UsageMeter,
+        requests: EndRequests,
     ) -> None:
         self._communicator = communicator
         self._queue = queue
         self._store = store
         self._on_change = on_change
         self._meter = meter
+        self._requests = requests
         self._running: dict[int, SomeTask] = {}
         self._rank_of: dict[str, int] = {}  # of a task that is running, by its key
         self._idle: list[int] = []  # a heap
         self._cancelled: set[str] = set()
         self._runs = 0
         self._changed = False
+        self._ends = False
         self._next_publication = -math.inf
 
-    def run(self) -> RunUsage:
-        """Dispatch from the first report to the last order, and return what it took."""
-        while len(self._idle) < self._communicator.Get_size() or not self._queue.done:
+    def run(self) -> RunUsage | None:
+        """Dispatch from the first report to the last order.
+
+        Returns
+        -------
+        RunUsage or None
+            What it took; None if the job was asked to end, and runs are left to be made.
+        """
+        while len(self._idle) < self._communicator.Get_size() or not (self._queue.done or self._ends):
             for report, rank in self._reports():
                 self._take(report, rank)
+            self._suspend_if_asked()
             self._cancel_unneeded()
             self._assign()
             self._changed = True
@@ -250,11 +259,14 @@ class Dispatcher(Generic[SomeTask]):
         self._publish()
         for rank in self._idle:
             _send(self._communicator, Stop(), rank, _ORDERS)
+        if not self._queue.done:
+            return None
         return RunUsage(self._runs, self._meter.elapsed, self._meter.fractions())
 
     def _reports(self) -> Iterator[tuple[WorkerReport, int]]:
         """Wait for a report; yield it and all others that have come."""
         while (received := _receive(self._communicator, _REPORTS)) is None:
+            self._suspend_if_asked()
             self._publish_if_due()
             time.sleep(_POLL_SECONDS)
         # Not more than one of each group: while reports keep coming the groups must get orders, too.
@@ -263,6 +275,12 @@ class Dispatcher(Generic[SomeTask]):
             if (received := _receive(self._communicator, _REPORTS)) is None:
                 return
         yield cast(tuple[WorkerReport, int], received)
+
+    def _suspend_if_asked(self) -> None:
+        if not self._ends and self._requests.arrived:
+            self._ends = True
+            for rank in self._running:
+                _send(self._communicator, Suspend(), rank, _ORDERS)
 
     def _publish_if_due(self) -> None:
         if self._changed and time.monotonic() >= self._next_publication:
@@ -281,7 +299,7 @@ class Dispatcher(Generic[SomeTask]):
                 self._queue.answer(task, answer)
                 self._runs += 1
                 self._meter.record_run(rank, seconds)
-            case Stopped(seconds):
+            case Unfinished(seconds):
                 self._queue.cancelled(self._end(rank))
                 self._meter.record_run(rank, seconds)
         heappush(self._idle, rank)
@@ -299,7 +317,7 @@ class Dispatcher(Generic[SomeTask]):
                 self._cancelled.add(task.key)
 
     def _assign(self) -> None:
-        while self._idle and (task := self._queue.next_task()) is not None:
+        while self._idle and not self._ends and (task := self._queue.next_task()) is not None:
             rank = heappop(self._idle)
             self._cancelled.discard(task.key)
             self._running[rank] = task
@@ -322,7 +340,7 @@ class Dispatcher(Generic[SomeTask]):
         return self._meter.mean_run * self._queue.runs_left / self._communicator.Get_size()
 
 
-def _send(communicator: Intracomm, message: Order | WorkerReport, rank: int, tag: int) -> None:
+def _send(communicator: Intracomm, message: DispatcherOrder | WorkerReport, rank: int, tag: int) -> None:
     communicator.send(message, dest=rank, tag=tag)
 
 

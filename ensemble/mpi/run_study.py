@@ -6,9 +6,11 @@ import time
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeVar, cast
+from typing import TYPE_CHECKING, TypeVar
 
+from ensemble.errors import SUSPENDED_STATUS, Interrupted
 from ensemble.mpi.dispatcher import Dispatcher, JobProgress, work
+from ensemble.mpi.end_requests import EndRequests
 from ensemble.mpi.groups import Groups
 from ensemble.mpi.store_on_ranks import whole_store
 from ensemble.mpi.usage import RunUsage, UsageMeter
@@ -187,28 +189,37 @@ def run_queue(
         What `conclude` returned, on every rank.
     usage : RunUsage
         On every rank.
+
+    Raises
+    ------
+    Interrupted
+        On every rank, if the job was asked to end before the queue was done.  What was run is kept.
     """
     groups = Groups.of(communicator, ranks_per_run)
     everyone, leaders = groups.everyone, groups.leaders
+    requests = EndRequests(everyone)
 
-    def dispatch(leaders: Intracomm) -> tuple[Result, RunUsage]:
+    def dispatch(leaders: Intracomm) -> tuple[Result, RunUsage] | None:
         with abort_guard(everyone):
             meter = UsageMeter(leaders.Get_size(), time.perf_counter)
             queue = begin()
             dispatcher = Dispatcher(
-                leaders, queue, whole_store(store), lambda progress: publish(queue, progress), meter
+                leaders, queue, whole_store(store), lambda progress: publish(queue, progress), meter, requests
             )
             usage = dispatcher.run()
-            return conclude(queue), usage
+            return None if usage is None else (conclude(queue), usage)
 
     result: tuple[Result, RunUsage] | None = None
-    if leaders is not None and leaders.Get_rank() == 0:
-        with ThreadPoolExecutor(1, "dispatcher") as thread:
-            dispatching = thread.submit(dispatch, leaders)
+    with requests:
+        if leaders is not None and leaders.Get_rank() == 0:
+            with ThreadPoolExecutor(1, "dispatcher") as thread:
+                dispatching = thread.submit(dispatch, leaders)
+                work(groups, store)
+                result = dispatching.result()
+        else:
             work(groups, store)
-            result = dispatching.result()
-    else:
-        work(groups, store)
-    result = everyone.bcast(result)
+        result = everyone.bcast(result)
     groups.free()
-    return cast(tuple[Result, RunUsage], result)
+    if result is None:
+        raise Interrupted(SUSPENDED_STATUS)
+    return result

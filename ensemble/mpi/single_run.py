@@ -6,6 +6,8 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from ensemble.config.run_key import run_key
+from ensemble.errors import SUSPENDED_STATUS, Interrupted
+from ensemble.mpi.end_requests import EndRequests
 from ensemble.mpi.groups import split
 from ensemble.mpi.store_on_ranks import whole_store
 from ensemble.mpi.world import on_root
@@ -14,8 +16,10 @@ from solver.scene import Scene
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
 
+    from ensemble.mpi.checkpointed_run import CheckpointKeeper
     from ensemble.mpi.store_on_ranks import StoreOnRank
     from ensemble.store.run_record import RunSummary
+    from solver.analysis.run import Run
     from solver.parallel import Parallel
 
 
@@ -47,6 +51,11 @@ def single_run(
     -------
     RunSummary or None
         On the first rank; None elsewhere.
+
+    Raises
+    ------
+    Interrupted
+        On every rank, if the job was asked to end before the run was done; its checkpoint is kept.
     """
 
     def stored() -> RunSummary | None:
@@ -60,19 +69,46 @@ def single_run(
     if summary is not None:
         return summary if is_first else None
     parallel = _first_ranks(communicator, ranks)
-    if parallel is None:
-        return None
 
     from ensemble.store.run_record import RunSummary
-    from solver.simulation.simulate import simulate
 
-    run = simulate(scene, parallel=parallel, on_progress=on_progress if is_first else None)
-    if not is_first:
-        return None
-    summary = RunSummary.of(run)
-    if store is not None:
+    if store is None:
+        run = _made(scene, parallel, None, on_progress)
+        return RunSummary.of(run) if run is not None and is_first else None
+    with EndRequests(communicator) as requests:
+        run = _made(scene, parallel, _keeper(store, scene, requests) if is_first else None, on_progress)
+        if on_root(communicator, lambda: run is None):
+            raise Interrupted(SUSPENDED_STATUS)
+        if run is None or not is_first:
+            return None
+        summary = RunSummary.of(run)
         whole_store(store).save(run, summary)
-    return summary
+        return summary
+
+
+def _keeper(store: StoreOnRank, scene: Scene, requests: EndRequests) -> CheckpointKeeper:
+    from ensemble.mpi.checkpointed_run import CheckpointKeeper, Order
+
+    return CheckpointKeeper(
+        store.checkpoint(scene), lambda: Order.SUSPEND if requests.arrived else Order.GO_ON
+    )
+
+
+def _made(
+    scene: Scene,
+    parallel: Parallel | None,
+    keeper: CheckpointKeeper | None,
+    on_progress: Callable[[float, float], None],
+) -> Run | None:
+    """Make a run on the ranks that have a part in it; None on the others, and if it was suspended."""
+    from ensemble.mpi.checkpointed_run import Stopped, checkpointed_run
+
+    if parallel is None:
+        return None
+    try:
+        return checkpointed_run(scene, parallel, keeper, on_progress if parallel.rank == 0 else None)
+    except Stopped:
+        return None
 
 
 def _first_ranks(communicator: Intracomm | None, ranks: int) -> Parallel | None:

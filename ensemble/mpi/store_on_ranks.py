@@ -7,6 +7,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ensemble.config.checkpoint_interval import checkpoint_seconds
 from ensemble.errors import refusing
 from ensemble.mpi.world import on_root
 
@@ -58,7 +59,8 @@ def store_on_ranks(communicator: Intracomm | None, path: Path) -> Iterator[Store
     Raises
     ------
     BadInput
-        On every rank, if the first one cannot open the store to write.
+        On every rank, if the first one cannot open the store to write, or the interval of checkpoints is no
+        number that is allowed.
     """
     from ensemble.store import RunStaging, Store
 
@@ -67,6 +69,7 @@ def store_on_ranks(communicator: Intracomm | None, path: Path) -> Iterator[Store
 
         def open_store() -> Path:
             nonlocal store
+            checkpoint_seconds()  # refused before there is a store
             with refusing():
                 store = stack.enter_context(Store.open(path))
             return store.path

@@ -209,6 +209,17 @@ def on_root(communicator: Intracomm | None, function: Callable[[], T]) -> T:
     return result
 
 
+def tell(line: str) -> None:
+    """Print a line to people, from any rank.
+
+    Parameters
+    ----------
+    line : str
+    """
+    # The stream of the process: the command line silences sys.stderr on every rank but the first.
+    print(f"ensemble: {line}", file=sys.__stderr__, flush=True)
+
+
 @contextmanager
 def only_first_rank_speaks() -> Iterator[None]:
     """Drop what this process prints within the block if its launcher has given it another rank than 0."""
@@ -242,9 +253,10 @@ def abort_guard(communicator: Intracomm | None) -> Iterator[None]:
         import traceback  # here, because signals are provided for only when this module has been imported
 
         line = told_in_a_line(error)
-        text = traceback.format_exc() if line is None else f"ensemble: {line}"
-        # The stream of the process: the command line silences sys.stderr on every rank but the first.
-        print(text, file=sys.__stderr__, flush=True)
+        if line is None:
+            print(traceback.format_exc(), file=sys.__stderr__, flush=True)
+        else:
+            tell(line)
         # The launcher stops forwarding output as soon as it hears of the end.
         time.sleep(_FORWARD_SECONDS)
         communicator.Abort(1)

@@ -247,15 +247,15 @@ def _opened(path: Path | None) -> Any:
 
 def _run_of(scene: Scene, store: Store | None) -> Run:
     """Return the run of a scene, from a store if it has it."""
-    from solver.simulation.simulate import simulate
+    if store is None:
+        from solver.simulation.simulate import simulate
 
-    key = run_key(scene)
-    if store is not None and store.contains(key):
-        return store.load(key)
-    run = simulate(scene)
-    if store is not None:
-        store.save(run)
-    return run
+        return simulate(scene)
+
+    from ensemble.mpi.single_run import single_run
+
+    single_run(None, scene, store, 1, lambda *_: None)
+    return store.load(run_key(scene))
 
 
 def _end_of_run(scene: Scene, store: Store | None) -> Shapes | str:

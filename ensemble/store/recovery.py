@@ -1,7 +1,8 @@
 """What becomes of runs that are in the directory of a store but not in its catalog, and the other way round.
 
 Nothing that holds data is deleted.  A whole run without a row is adopted: its row is written.  What is no
-whole run is moved to `lost+found/`.  Only the unfinished staging of a dead process is removed.
+whole run is moved to `lost+found/`.  Only the unfinished staging of a dead process is removed, and the
+checkpoint of a run that is committed.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from uuid import uuid4
 from ensemble.disk import flush
 from ensemble.errors import OtherVersionError, StoreError
 from ensemble.store.catalog import Catalog
+from ensemble.store.checkpoint import checkpointed_keys, remove_checkpoint
 from ensemble.store.run_record import RunSummary
 from ensemble.store.staging import RUNS, STAGING, abandoned, is_own_directory, whole_runs
 
@@ -38,7 +40,9 @@ class Recovery:
         self._catalog = catalog
 
     def recover(self) -> list[str]:
-        """Adopt whole runs, set aside what is not one, and remove the unfinished staging of dead processes.
+        """Adopt whole runs, set aside what is not one, and remove what dead processes left unfinished.
+
+        That is their staging, and checkpoints of runs that are committed.
 
         Returns
         -------
@@ -53,6 +57,9 @@ class Recovery:
         for writer in abandoned(self._path / STAGING):
             adopted += [self._adopt_staged(directory, committed) for directory in whole_runs(writer)]
             shutil.rmtree(writer)
+        for key in checkpointed_keys(self._path):
+            if key in committed:  # the process that committed it died before it could remove this
+                remove_checkpoint(self._path, key)
         if sum(adopted):
             done.append(f"adopted {sum(adopted)} runs that were not in the catalog of {self._path}")
         return done

@@ -17,14 +17,19 @@ from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import mkdtemp
+from typing import TYPE_CHECKING
 from uuid import uuid4
 
 from tenacity import Retrying, retry_if_exception_type, stop_after_delay, wait_exponential_jitter
 
 from ensemble.disk import flush, flush_tree, locked
 from ensemble.errors import StoreError
+from ensemble.store.checkpoint import Checkpoint
 from ensemble.store.run_record import RunSummary
 from solver.analysis.run import Run
+
+if TYPE_CHECKING:
+    from solver.scene import Scene
 
 RUNS = "runs"
 STAGING = "staging"
@@ -119,6 +124,20 @@ class RunStaging(AbstractContextManager["RunStaging"]):
             raise
         flush(self._directory)
         return Staged(whole, summary)
+
+    def checkpoint(self, scene: Scene) -> Checkpoint:
+        """Return the checkpoint of a run.
+
+        Parameters
+        ----------
+        scene : Scene
+            Of the run.
+
+        Returns
+        -------
+        Checkpoint
+        """
+        return Checkpoint(self.path, scene, self.directory)
 
     def directory(self) -> Path:
         """Return this process's directory; it is made if there is none.

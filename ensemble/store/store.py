@@ -25,6 +25,7 @@ from ensemble.search.boundary import Boundary
 from ensemble.search.task_queue import RunAnswer
 from ensemble.store.catalog import Catalog
 from ensemble.store.catalog_tables import Record
+from ensemble.store.checkpoint import Checkpoint, remove_checkpoint
 from ensemble.store.listing import Listing, ParameterRange
 from ensemble.store.reading import readable, validated
 from ensemble.store.recovery import Recovery
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
     from ensemble.store.archive import StoredArrays
     from ensemble.store.branch_shelf import BranchShelf
     from ensemble.store.verification import OnProgress
+    from solver.scene import Scene
     from solver.simulation.steady_scenes import SteadyBranch
 
 _CANDIDATES = 5  # keys that a message about an ambiguous one names
@@ -166,8 +168,22 @@ class Store(AbstractContextManager["Store"]):
         """
         return self._staging.stage(run, summary)
 
+    def checkpoint(self, scene: Scene) -> Checkpoint:
+        """Return the checkpoint of a run; see `RunStaging.checkpoint`.
+
+        Parameters
+        ----------
+        scene : Scene
+            Of the run.
+
+        Returns
+        -------
+        Checkpoint
+        """
+        return self._staging.checkpoint(scene)
+
     def commit(self, staged: Staged) -> str:
-        """Commit a staged run: from then on it exists.
+        """Commit a staged run: from then on it exists, and its checkpoint is removed.
 
         If the key exists already, that run stays and the staged copy is removed.  While the database or the
         disk does not answer the commit is tried again for `ensemble.store.staging.DISK_SECONDS`.
@@ -201,6 +217,7 @@ class Store(AbstractContextManager["Store"]):
         with locked(self._lock):
             if self.contains(staged.key):
                 shutil.rmtree(staged.directory, ignore_errors=True)
+                remove_checkpoint(self.path, staged.key)
                 return staged.key
             if staged.directory.exists():  # else an earlier attempt has moved it
                 if destination.exists():
@@ -209,6 +226,7 @@ class Store(AbstractContextManager["Store"]):
                 os.rename(staged.directory, destination)
                 flush(self._runs)
             self._catalog.insert(staged.summary)
+            remove_checkpoint(self.path, staged.key)
         return staged.key
 
     def save(self, run: Run, summary: RunSummary | None = None) -> str:

@@ -46,16 +46,11 @@ _NUMERICAL_FAILURES = (
 )
 
 
-class Cancelled(Exception):  # noqa: N818  the caller wants it, so it is no error
-    """The caller asked the simulation to stop."""
-
-
 def simulate(
     scene: Scene,
     *,
     parallel: Parallel = SERIAL,
-    should_stop: Callable[[], bool] | None = None,
-    on_progress: Callable[[float, float], None] | None = None,
+    after_step: Callable[[Simulation], None] | None = None,
 ) -> Run:
     """Run a scene until its outcome is decided.
 
@@ -66,32 +61,16 @@ def simulate(
     scene : Scene
     parallel : Parallel
         The ranks that compute the run together.
-    should_stop : callable, optional
-        Called after every step, on the first rank only.  When it returns true, all ranks raise `Cancelled`.
-    on_progress : callable, optional
-        Called after every step with the time reached and the latest time at which the run ends, on each rank
-        that gives one.
+    after_step : callable, optional
+        See `Simulation.complete`.
 
     Returns
     -------
     Run
         A numerical failure is an outcome (`Outcome.FAILED` with its reason), not an exception.
-
-    Raises
-    ------
-    Cancelled
-        If ``should_stop`` has returned true.
     """
     with one_blas_thread():
-        simulation = Simulation(scene, parallel=parallel)
-        should_stop = first_rank_asks(parallel, should_stop)
-        while not simulation.done:
-            simulation.step()
-            if should_stop and should_stop():
-                raise Cancelled
-            if on_progress and not simulation.relaxes:
-                on_progress(simulation.time, scene.latest_time)
-        return simulation.run()
+        return Simulation(scene, parallel=parallel).complete(after_step)
 
 
 class Simulation:
@@ -171,6 +150,26 @@ class Simulation:
                     self._loop.recorder.finish(self._loop.time, self._loop.state)
             except _NUMERICAL_FAILURES as error:
                 self._failure = _failure(self._loop, error)
+
+    def complete(self, after_step: Callable[[Simulation], None] | None = None) -> Run:
+        """Take all steps that are left, and return the run.
+
+        Parameters
+        ----------
+        after_step : callable, optional
+            Called on each rank after every step, the last one included, with this simulation.  It may read,
+            and save; what it raises ends the loop and has to be raised on all ranks.
+
+        Returns
+        -------
+        Run
+        """
+        with one_blas_thread():
+            while not self.done:
+                self.step()
+                if after_step:
+                    after_step(self)
+            return self.run()
 
     def run(self) -> Run:
         """Return the run.

@@ -19,6 +19,7 @@ from typing import Any
 
 from ensemble.config.documents import load_study
 from ensemble.mpi.dispatcher import Dispatcher, Finished, Ready
+from ensemble.mpi.end_requests import EndRequests
 from ensemble.mpi.usage import UsageMeter
 from ensemble.search.point_search import SearchRun
 from ensemble.search.study_planner import StudyPlanner
@@ -93,7 +94,7 @@ def reports_a_second(points: int, ranks: int, seconds: float, changes: list[str]
             boundaries.save_boundary(planner.boundary())
 
         meter = UsageMeter(ranks, time.perf_counter)
-        dispatcher = Dispatcher(communicator, planner, boundaries, publish, meter)  # type: ignore[arg-type]
+        dispatcher = Dispatcher(communicator, planner, boundaries, publish, meter, EndRequests(None))  # type: ignore[arg-type]
         with suppress(TimeOverError):
             dispatcher.run()
         return communicator.finished / (time.perf_counter() - begin)

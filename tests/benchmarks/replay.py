@@ -28,7 +28,8 @@ from mpi4py import MPI
 
 from ensemble.config.documents import load_study
 from ensemble.mpi import dispatcher
-from ensemble.mpi.dispatcher import Cancel, Dispatcher, Finished, Ready, Stopped
+from ensemble.mpi.dispatcher import Cancel, Dispatcher, Finished, Ready, Unfinished
+from ensemble.mpi.end_requests import EndRequests
 from ensemble.mpi.usage import UsageMeter
 from ensemble.search.point_search import SearchRun
 from ensemble.search.study_planner import StudyPlanner
@@ -94,7 +95,7 @@ class SimulatedGroups:
             if key == order.key:
                 self._void.add(number)
                 del self._running[dest]
-                self._report(now, Stopped(now - begin), dest)
+                self._report(now, Unfinished(now - begin), dest)
 
     def improbe(self, source: int, tag: int, status: Any) -> SimulatedGroups | None:
         while self._reports and self._reports[0][1] in self._void:
@@ -170,6 +171,7 @@ def replay(points: int, groups: int, durations: list[float], costs: tuple[float,
                 store,  # type: ignore[arg-type]
                 lambda progress: store.save_boundary(planner.boundary()),
                 meter,
+                EndRequests(None),
             )
             usage = coordinator.run()
     return {

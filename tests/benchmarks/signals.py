@@ -22,6 +22,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -87,22 +88,34 @@ class Try:
 
 
 class Job:
-    """A study in a session of its own; all of its processes inherit a mark."""
+    """A command in a session of its own; all of its processes inherit a mark.
 
-    def __init__(self, ranks: int, store: Path) -> None:
+    Parameters
+    ----------
+    ranks : int
+        `ALONE` without a launcher.
+    arguments : sequence of str
+        Of `ensemble`.
+    directory : Path
+        For what it prints.
+    **variables : str
+        Added to its environment.
+    """
+
+    def __init__(self, ranks: int, arguments: Sequence[str], directory: Path, **variables: str) -> None:
         self._mark = uuid4().hex
         self._known: set[psutil.Process] = set()
         beside = Path(sys.executable).parent
-        command = [sys.executable, "-m", "ensemble", *STUDY, f"--store={store}"]
+        command = [sys.executable, "-m", "ensemble", *arguments]
         if ranks != ALONE:
             command = [str(beside / "mpirun"), "-n", str(ranks), *command]
         path = os.pathsep.join([str(beside), os.environ["PATH"]])
         # Files and not pipes: a process that is left behind must not keep us waiting.
-        self._printed, self._said = store.with_name("printed"), store.with_name("said")
+        self._printed, self._said = directory / "printed", directory / "said"
         with self._printed.open("w") as printed, self._said.open("w") as said:
             self.launcher = subprocess.Popen(
                 command,
-                env=os.environ | {"PATH": path, MARK: self._mark},
+                env=os.environ | {"PATH": path, MARK: self._mark} | variables,
                 stdin=subprocess.DEVNULL,
                 stdout=printed,
                 stderr=said,
@@ -220,7 +233,7 @@ class Series:
     def go_on(self) -> Try | None:
         """Make a try; None if the job came to its end, or could not be hit, before the signal."""
         plan = Plan.draw(self._chance, self._earliest)
-        job = Job(plan.ranks, self._store)
+        job = Job(plan.ranks, [*STUDY, f"--store={self._store}"], self._store.parent)
         try:
             time.sleep(plan.moment)
             known = _keys(self._store)

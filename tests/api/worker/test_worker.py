@@ -26,6 +26,7 @@ from api.worker.mpirun import mpirun_command
 from api.worker.worker import ANSWERS, MAXIMUM_CRASHES, JobResult, Worker, job_result
 from ensemble.questions import INCOMPLETE_STATUS, Question, preset_question
 from ensemble.store import Store
+from ensemble.store.checkpoint import checkpoint_path
 from tests.api.accepting import accepted
 from tests.api.processes import Family, alive, wait_until, working
 
@@ -39,6 +40,7 @@ SECONDS_TO_DIE = 20
 COARSE = {"numerics.points": 32, "numerics.tolerance": 1e-3}
 QUICK_SCENE = preset_question("doublet-shear", COARSE | {"criteria.revolutions": 1})
 LONG_SCENE = preset_question("doublet-shear", {"numerics.points": 256, "numerics.tolerance": 1e-9})
+ENDLESS_SCENE = preset_question("doublet-shear", COARSE | {"horizon": 1e5, "criteria.revolutions": 10**5})
 FAILING_SCENE = preset_question("doublet-shear", COARSE | {"numerics.work_limit": 20})
 COARSE_STUDY = {f"scene.{path}": value for path, value in COARSE.items()}
 STUDY = preset_question(
@@ -169,6 +171,19 @@ def test_a_stopped_worker_gives_its_job_back(jobs, store, number):
         assert family.members() == []
     assert jobs.get(job.id).status is JobStatus.ACCEPTED
     assert jobs.lease("another") is not None, "without waiting for the lease to run out"
+
+
+def test_a_stopped_worker_keeps_the_run_of_its_job_and_the_next_one_goes_on_with_it(jobs, store):
+    job = submit(jobs, ENDLESS_SCENE, ranks=2)
+    log = jobs.log_path(job)
+    with working(store) as family:
+        wait_until(lambda: log.exists() and "time" in log.read_text())
+        family.worker.send_signal(signal.SIGTERM)
+        assert family.worker.wait(SECONDS_TO_DISMISS) == 0
+        assert family.members() == []
+    assert checkpoint_path(store, job.key).exists()
+    with working(store):
+        wait_until(lambda: "goes on from its checkpoint" in log.read_text())
 
 
 def test_a_worker_ends_with_its_input_if_asked(jobs, store):
@@ -303,6 +318,22 @@ def test_what_is_no_answer_is_tried_again(jobs, worker, command, monkeypatch, cr
     assert (done.status, done.message) == (JobStatus.FAILED, "underflow")
     assert f"attempt 1 ended {words}; tried again" in jobs.log_path(job).read_text()
     assert all(2.0**number / 2 <= seconds <= 2.0**number for number, seconds in enumerate(waited))
+
+
+def test_a_job_that_was_asked_to_end_is_given_back_at_once_and_never_given_up(jobs, worker, command):
+    works, stop = worker
+    job = submit(jobs, QUICK_SCENE)
+    command("exit 75")
+    thread = threading.Thread(target=works.run, args=(stop,))
+    thread.start()
+    try:
+        wait_until(lambda: jobs.get(job.id).attempts > MAXIMUM_CRASHES)
+        command(f"echo '{ANSWER}'; exit {INCOMPLETE_STATUS}")
+        wait_until(finished(jobs, job))
+    finally:
+        stop.set()
+        thread.join()
+    assert jobs.get(job.id).message == "underflow"
 
 
 def test_a_job_that_always_crashes_fails_with_the_end_of_its_log(jobs, worker, command, monkeypatch):

@@ -150,7 +150,7 @@ def test_a_killed_rank_of_a_group_ends_the_job(launcher, tmp_path):
 RUNNING = """
 import sys
 from pathlib import Path
-import solver.simulation.simulate
+import ensemble.mpi.checkpointed_run
 from ensemble.search.task_queue import Task
 from ensemble.config.run_key import run_key
 from ensemble.mpi.world import abort_guard, world
@@ -194,7 +194,7 @@ def broken(*_, **__):
 
 communicator, path = world(), Path(sys.argv[1])
 if communicator.Get_rank() == int(sys.argv[2]):
-    solver.simulation.simulate.simulate = broken
+    ensemble.mpi.checkpointed_run.checkpointed_run = broken
 with abort_guard(communicator):
     with store_on_ranks(communicator, path) as store:
         queue, usage = run_queue(communicator, 2, store, MadeUpQueue, lambda *_: None, lambda queue: queue)

@@ -67,26 +67,30 @@ from solver.simulation.simulate import simulate
 from tests.ensemble.mpi.rank_comparison import DOUBLET
 communicator = world()
 with abort_guard(communicator):
-    def progress(time, latest):
+    def break_down(simulation):
         if communicator.Get_rank() == 1:
             raise ValueError("this rank broke")
-    simulate(DOUBLET, parallel=Ranks(communicator), on_progress=progress)
+    simulate(DOUBLET, parallel=Ranks(communicator), after_step=break_down)
 """
 
 CANCELLED = """
+import sys
+from pathlib import Path
 from ensemble.mpi.world import abort_guard, world
+from ensemble.mpi.checkpointed_run import CheckpointKeeper, Order, Stopped, checkpointed_run
 from ensemble.mpi.ranks import Ranks
-from solver.simulation.simulate import Cancelled, simulate
+from ensemble.store import RunStaging
 from tests.ensemble.mpi.rank_comparison import DOUBLET
 communicator = world()
-with abort_guard(communicator):
+with abort_guard(communicator), RunStaging(Path(sys.argv[1])) as staging:
     asked = []
-    def stop():
+    def order():
         asked.append(1)
-        return len(asked) == 3
+        return Order.CANCEL if len(asked) == 3 else Order.GO_ON
+    keeper = CheckpointKeeper(staging.checkpoint(DOUBLET), order) if communicator.Get_rank() == 0 else None
     try:
-        simulate(DOUBLET, parallel=Ranks(communicator), should_stop=stop)
-    except Cancelled:
+        checkpointed_run(DOUBLET, Ranks(communicator), keeper)
+    except Stopped:
         print(f" cancelled {len(asked)} ", end="")
 """
 
@@ -124,8 +128,10 @@ with abort_guard(communicator):
 """
 
 
-def run(launcher: Any, ranks: int, code: str) -> subprocess.CompletedProcess[str]:
-    completed: subprocess.CompletedProcess[str] = launcher.run(ranks, [sys.executable, "-c", code])
+def run(launcher: Any, ranks: int, code: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+    completed: subprocess.CompletedProcess[str] = launcher.run(
+        ranks, [sys.executable, "-c", code, *arguments]
+    )
     return completed
 
 
@@ -146,8 +152,8 @@ def test_ranks_that_no_longer_agree_end_the_job(launcher: Any) -> None:
     assert "do their processors round alike?" in result.stderr
 
 
-def test_the_first_rank_alone_is_asked_whether_to_stop_and_stops_all(launcher: Any) -> None:
-    result = run(launcher, 2, CANCELLED)
+def test_the_first_rank_alone_is_asked_whether_to_stop_and_stops_all(launcher: Any, tmp_path: Path) -> None:
+    result = run(launcher, 2, CANCELLED, str(tmp_path))
     assert result.stdout.count("cancelled") == 2, result.stderr
     assert {"0", "3"} <= set(result.stdout.split())
 

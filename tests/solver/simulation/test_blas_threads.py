@@ -21,7 +21,7 @@ def threads():
 
 within = []
 scene = Scene(horizon=0.02, vesicles=[{}], numerics={"points": 16})
-simulate(scene, on_progress=lambda *_: within.append(threads()))
+simulate(scene, after_step=lambda _: within.append(threads()))
 print(json.dumps({"within": within[0], "after": threads()}))
 """
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from solver import Outcome, Run, Scene
 from solver.membrane.curve import area, positions, tangents
 from solver.scene import Extension, Numerics, Output, PowerLaw, Shear, Start, Trap, Vesicle
-from solver.simulation.simulate import Cancelled, simulate
+from solver.simulation.simulate import Simulation, simulate
 from tests.solver.scenes import fixed_horizon, shear_pair, uneven_pair
 
 Array = NDArray[np.float64]
@@ -278,24 +278,26 @@ def test_a_run_that_does_not_fail_has_no_reason() -> None:
 
 
 def test_the_caller_can_stop_a_run() -> None:
-    calls: list[tuple[float, float]] = []
+    times: list[float] = []
 
-    def progress(time: float, horizon: float) -> None:
-        calls.append((time, horizon))
+    def follow(simulation: Simulation) -> None:
+        times.append(simulation.time)
+        if len(times) == 5:
+            raise StopIteration
 
-    with pytest.raises(Cancelled):
-        simulate(shear_pair(1.5), should_stop=lambda: len(calls) >= 5, on_progress=progress)
-    assert len(calls) == 5
-    assert all(earlier[0] < later[0] for earlier, later in pairwise(calls))
-    assert calls[0][1] == 400.0  # the horizon with its extensions
+    with pytest.raises(StopIteration):
+        simulate(shear_pair(1.5), after_step=follow)
+    assert len(times) == 5
+    assert all(earlier < later for earlier, later in pairwise(times))
 
 
-def test_the_caller_can_stop_the_relaxation() -> None:
-    with pytest.raises(Cancelled):
-        simulate(
-            uneven_pair(flow=Trap(rate=0.02), start=Start(relaxed=True), horizon=100.0),
-            should_stop=lambda: True,
-        )
+def test_the_caller_is_asked_while_the_start_relaxes() -> None:
+    def stop(simulation: Simulation) -> None:
+        assert simulation.relaxes
+        raise StopIteration
+
+    with pytest.raises(StopIteration):
+        simulate(uneven_pair(flow=Trap(rate=0.02), start=Start(relaxed=True), horizon=100.0), after_step=stop)
 
 
 def test_equal_scenes_give_equal_runs() -> None:

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 def followed(scene: Scene) -> tuple[Run, float]:
     """A run, and when its last step began."""
     ends = [0.0]
-    run = simulate(scene, on_progress=lambda time, _: ends.append(time))
+    run = simulate(scene, after_step=lambda simulation: ends.append(simulation.time))
     return run, ends[-2]
 
 

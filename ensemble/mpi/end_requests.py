@@ -1,0 +1,101 @@
+"""Requests to end a job that can stop after a step: signals, whichever of its ranks they reach."""
+
+from __future__ import annotations
+
+import threading
+from contextlib import AbstractContextManager
+from typing import TYPE_CHECKING, ClassVar
+
+from ensemble.errors import Interrupted
+from ensemble.mpi.world import tell
+
+if TYPE_CHECKING:
+    from mpi4py.MPI import Intracomm, Request
+
+_REQUESTS = 3  # tag of messages to the first rank
+
+
+class EndRequests(AbstractContextManager["EndRequests"]):
+    """Takes requests to end, within a block.
+
+    Only the first rank learns of them, because it decides for all.  Entering and leaving is collective, but
+    for errors.
+
+    Parameters
+    ----------
+    communicator : Intracomm or None
+        All ranks; None if this process is alone.
+    """
+
+    _current: ClassVar[EndRequests | None] = None
+
+    def __init__(self, communicator: Intracomm | None) -> None:
+        self._communicator = communicator
+        self._rank = 0 if communicator is None else communicator.Get_rank()
+        # A signal handler runs in the main thread, which may be the one that holds the lock.
+        self._lock = threading.RLock()
+        self._asked = False
+        self._sent: Request | None = None
+        self._received = 0
+
+    @classmethod
+    def ask(cls) -> bool:
+        """Ask the job of this process to end after its next step.
+
+        Returns
+        -------
+        bool
+            False if it cannot, or has been asked before: then the process has to end at once.
+        """
+        current = cls._current
+        return current is not None and current._take()
+
+    @property
+    def arrived(self) -> bool:
+        """Whether the job has been asked to end; to be read on the first rank."""
+        if not self._asked and self._communicator is not None and self._communicator.Get_size() > 1:
+            self._receive()
+        return self._asked
+
+    def __enter__(self) -> EndRequests:
+        """Take requests from now on."""
+        EndRequests._current = self
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        """Take none any more, and receive the messages that are on their way."""
+        with self._lock:
+            EndRequests._current = None
+            self._asked = True
+        if self._communicator is None or (kind is not None and not issubclass(kind, Interrupted)):
+            return
+        sent: int = self._communicator.reduce(int(self._sent is not None)) or 0
+        while self._rank == 0 and self._received < sent:
+            self._receive()
+        if self._sent is not None:
+            self._sent.wait()
+
+    def _take(self) -> bool:
+        with self._lock:
+            if self._asked:
+                return False
+            if self._communicator is not None and self._rank > 0:
+                self._sent = self._communicator.isend(None, dest=0, tag=_REQUESTS)
+                self._asked = True
+            else:
+                self._note()
+            return True
+
+    def _receive(self) -> None:
+        assert self._communicator is not None
+        message = self._communicator.improbe(tag=_REQUESTS)
+        if message is not None:
+            message.recv()
+            self._received += 1
+            self._note()
+
+    def _note(self) -> None:
+        """Note on the first rank that the job is asked to end, and say so once."""
+        if not self._asked:
+            self._asked = True
+            tell("ends after the next step of its runs; the same command goes on (a second signal: at once)")
