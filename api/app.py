@@ -13,7 +13,7 @@ from starlette.middleware.gzip import DEFAULT_EXCLUDED_CONTENT_TYPES, GZipMiddle
 from starlette.types import Lifespan
 
 from api.http import problems
-from api.http.middleware import BodyLimits, Pieces, RequestMetrics, SecurityHeaders
+from api.http.middleware import BodyLimits, Pieces, RequestMetrics, SecurityHeaders, StoppedRequests
 from api.http.openapi import add_models, shorten_descriptions
 from api.jobs.job import NoSuchJob
 from api.jobs.submissions import Submission
@@ -91,6 +91,7 @@ def create_app(service: Service, lifespan: Lifespan[FastAPI] | None = None) -> F
     shorten_descriptions(app)
     add_models(app, DESCRIBED_MODELS)
     settings = service.settings
+    app.add_middleware(StoppedRequests)
     # Higher levels compress hardly better and take longer than to send what they save.
     app.add_middleware(
         GZipMiddleware,

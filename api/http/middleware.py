@@ -11,6 +11,8 @@ from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from api.http.problems import problem_response, unavailable
+
 SECURITY_HEADERS = {
     "Cache-Control": "no-store",
     "Content-Security-Policy": "default-src 'none'; base-uri 'none'; frame-ancestors 'none'",
@@ -87,6 +89,42 @@ class BodyLimits:
                 HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
                 f"body: {size} bytes — must be at most {self._maximum_bytes}",
             )
+
+
+class StoppedRequests:
+    """Answer the requests that are not finished when the server stops: they may be sent again.
+
+    Parameters
+    ----------
+    app : ASGIApp
+        The application that may be stopped.
+    """
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request; see the ASGI specification for the arguments.
+
+        Parameters
+        ----------
+        scope : Scope
+        receive : Receive
+        send : Send
+        """
+        has_begun = False
+
+        async def send_noted(message: Message) -> None:
+            nonlocal has_begun
+            has_begun = True
+            await send(message)
+
+        try:
+            await self._app(scope, receive, send_noted)
+        except asyncio.CancelledError:
+            if has_begun or scope["type"] != "http":
+                raise
+            await problem_response(unavailable("the server stops"))(scope, receive, send)
 
 
 class Pieces:

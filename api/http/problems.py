@@ -15,6 +15,7 @@ from pydantic_core import ErrorDetails
 from sqlalchemy.exc import InterfaceError, InternalError, OperationalError
 from sqlalchemy.exc import TimeoutError as NoConnectionLeft
 from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
 
 from ensemble.config.validation import describe
 from ensemble.errors import BadInput, StoreError
@@ -104,6 +105,7 @@ def install_handlers(app: FastAPI, missing: Iterable[type[Exception]]) -> None:
     app.add_exception_handler(RequestValidationError, _validation_error)
     app.add_exception_handler(BadInput, _bad_input)
     app.add_exception_handler(StoreError, _damage)
+    app.add_exception_handler(ClientDisconnect, _incomplete_body)
     for trouble in OUTAGES:
         app.add_exception_handler(trouble, _outage)
     for error in missing:
@@ -111,7 +113,17 @@ def install_handlers(app: FastAPI, missing: Iterable[type[Exception]]) -> None:
     app.add_exception_handler(Exception, _server_error)
 
 
-def _response(problem: Problem) -> Response:
+def problem_response(problem: Problem) -> Response:
+    """Return the answer that a problem becomes.
+
+    Parameters
+    ----------
+    problem : Problem
+
+    Returns
+    -------
+    Response
+    """
     detail = problem.detail  # may quote what a client has sent
     if len(detail) > LONGEST_DETAIL:
         detail = f"{detail[:LONGEST_DETAIL]}…"
@@ -129,7 +141,7 @@ def _response(problem: Problem) -> Response:
 
 def _problem(_: Request, error: Exception) -> Response:
     assert isinstance(error, Problem)
-    return _response(error)
+    return problem_response(error)
 
 
 def _http_error(request: Request, error: Exception) -> Response:
@@ -141,18 +153,23 @@ def _http_error(request: Request, error: Exception) -> Response:
         path = getattr(request.scope.get("route"), "path", None)  # the description itself has no route
         described = request.app.openapi()["paths"].get(path, {})
         headers["Allow"] = ", ".join(sorted(described)).upper() or headers["Allow"]
-    return _response(Problem(status, error.detail, headers))
+    return problem_response(Problem(status, error.detail, headers))
 
 
 def _validation_error(_: Request, error: Exception) -> Response:
     assert isinstance(error, RequestValidationError)
     # The first part of a location is "query", "path" or "header".
     errors: Sequence[ErrorDetails] = [details | {"loc": details["loc"][1:]} for details in error.errors()]
-    return _response(Problem(HTTPStatus.UNPROCESSABLE_ENTITY, describe(errors[:MAXIMUM_FIELDS], {})))
+    return problem_response(Problem(HTTPStatus.UNPROCESSABLE_ENTITY, describe(errors[:MAXIMUM_FIELDS], {})))
 
 
 def _bad_input(_: Request, error: Exception) -> Response:
-    return _response(Problem(HTTPStatus.UNPROCESSABLE_ENTITY, str(error)))
+    return problem_response(Problem(HTTPStatus.UNPROCESSABLE_ENTITY, str(error)))
+
+
+def _incomplete_body(_: Request, __: Exception) -> Response:
+    # Nobody reads it, but the request is counted, and the log is not filled by clients that go away.
+    return problem_response(Problem(HTTPStatus.BAD_REQUEST, "body: the connection was closed before its end"))
 
 
 def _damage(request: Request, error: Exception) -> Response:
@@ -161,7 +178,7 @@ def _damage(request: Request, error: Exception) -> Response:
     detail = (
         "what is stored is damaged; `ensemble check --repair` sets it aside, so that it can be made again"
     )
-    return _response(Problem(HTTPStatus.CONFLICT, detail))
+    return problem_response(Problem(HTTPStatus.CONFLICT, detail))
 
 
 def unavailable(what: str) -> Problem:
@@ -184,19 +201,19 @@ def _outage(request: Request, error: Exception) -> Response:
     # The paths that the error may name are for the log only.
     _log.error("%s: %s", request.url.path, reason(error))
     if isinstance(error, OSError) and not isinstance(error, TimeoutError):
-        return _response(
+        return problem_response(
             unavailable(f"the store cannot be used at the moment: {error.strerror or 'disk error'}")
         )
     cause = "its disk is full" if "full" in reason(error) else "it does not answer or cannot be written to"
-    return _response(unavailable(f"the database cannot be used at the moment: {cause}"))
+    return problem_response(unavailable(f"the database cannot be used at the moment: {cause}"))
 
 
 def _missing_resource(request: Request, _: Exception) -> Response:
-    return _response(Problem(HTTPStatus.NOT_FOUND, f"there is nothing at {request.url.path}"))
+    return problem_response(Problem(HTTPStatus.NOT_FOUND, f"there is nothing at {request.url.path}"))
 
 
 def _server_error(_: Request, __: Exception) -> Response:
     # Details are in the server's log only: they are of no use to a client and may reveal internals.
-    return _response(
+    return problem_response(
         Problem(HTTPStatus.INTERNAL_SERVER_ERROR, "internal error of the server; its log has the details")
     )

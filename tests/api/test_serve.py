@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+import asyncio
 import errno
 import os
 import signal
 import socket
 import subprocess
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import httpx2
 import psutil
 import pytest
+from fastapi import APIRouter
 
 from api.auth import TokenScope
 from tests.api.processes import alive, wait_until
-from tests.api.servers import make_token
+from tests.api.servers import make_token, serving
 from tests.api.services import SERVE, service
 
 SECONDS = 600
@@ -57,6 +61,24 @@ def test_a_study_is_traced_and_its_boundary_is_stored(ensemble, store):
     # The command line reads the same store.
     listed = ensemble("query", "boundaries", f"--store={store}")
     assert job["key"] in listed.stdout
+
+
+def test_a_request_that_the_end_of_the_server_cuts_off_may_be_sent_again(store, monkeypatch):
+    monkeypatch.setattr("api.serve.DRAIN_SECONDS", 1)
+    router, begun = APIRouter(), threading.Event()
+
+    @router.get("/endless")
+    async def endless() -> None:
+        begun.set()
+        await asyncio.sleep(SECONDS)
+
+    with ThreadPoolExecutor(1) as pool:
+        with serving(store, [router]) as address:
+            asked = pool.submit(httpx2.get, f"{address}/endless", timeout=SECONDS)
+            assert begun.wait(SECONDS)
+        answer = asked.result()
+    assert (answer.status_code, answer.json()["detail"]) == (503, "the server stops")
+    assert answer.headers["retry-after"]
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGKILL])

@@ -1,9 +1,10 @@
 """Sends made-up bytes to the service: ``python -m tests.benchmarks.raw_attacks``.
 
-Requests are put together from valid and invalid parts, and clients behave badly after them: they are silent,
-drip, never read, close a half.  Prints how many answers of each status there were, how many connections
-stayed open, and the memory of the server before, at its largest and after.  The exit status is 0 only if
-there was no server error, no connection stayed open and the server still answers.
+Requests are put together from valid and invalid parts, in valid and invalid frames, and clients behave badly:
+they send byte by byte or twenty at once, are silent, drip, never read, close a half.  Prints how many answers
+of each status there were, how many connections stayed open, and the memory of the server before, at its
+largest and after.  The exit status is 0 only if there was no server error, no connection stayed open and the
+server still answers.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from tests.api.services import StartedService, service
 from tests.api.stores import fill
 
 AT_ONCE = 30
+SINGLE_BYTES = 500  # of a request that is sent byte by byte
 SECONDS = 60  # after which a connection counts as one that stays open; the limits are far shorter
 LIMITS = {
     "HEADER_SECONDS": 1,
@@ -36,7 +38,8 @@ LIMITS = {
     "IDLE_SECONDS": 1,
     "EVENT_SECONDS": 0.2,
 }
-METHODS = [b"GET"] * 6 + [
+PLAIN = 0.75  # how often a part of a head is as clients send it
+METHODS = [
     b"POST",
     b"DELETE",
     b"HEAD",
@@ -75,17 +78,14 @@ TARGETS = [
     b"/flows",
     b"/\xff",
 ]
-VERSIONS = [b"HTTP/1.1"] * 6 + [b"HTTP/1.0", b"HTTP/2.0", b"HTTP/9.9", b"", b"HTTP/1.1 extra"]
-HOSTS = [b"Host: localhost"] * 6 + [
+VERSIONS = [b"HTTP/1.0", b"HTTP/2.0", b"HTTP/9.9", b"", b"HTTP/1.1 extra"]
+HOSTS = [
     b"",
     b"Host: evil.example",
     b"Host: localhost\r\nHost: b",
     b"Host: " + b"h" * 9000,
 ]
 HEADERS = [
-    b"",
-    b"",
-    b"",
     b"Content-Length: 1000000",
     b"Content-Length: 5",
     b"Content-Length: -1",
@@ -115,23 +115,95 @@ HEADERS = [
     b"Content-Type: application/json",
 ]
 BODIES = [
-    b"",
-    b"",
     b"{",
     b'{"preset":"doublet-shear"}',
-    b"0\r\n\r\n",
-    b"5\r\nhello\r\n",
-    b"ffffffffffffffff\r\n",
+    b'{"preset":"doublet-shear","set":{"horizon":1e999}}',
+    b'{"preset":"doublet-shear","set":{"flow.rate":NaN}}',
+    b'{"preset":"doublet-shear","set":{"' + b"a." * 40_000 + b'":1}}',
+    b'{"preset":"doublet-shear","ranks":' + b"9" * 5000 + b"}",
+    b'{"preset":"doublet-shear","preset":"vesicle-shear"}',
+    b'{"preset":"\\ud800"}',
+    b'\xef\xbb\xbf{"preset":"doublet-shear"}',
+    b'{"preset":"\xff\xfe"}',
+    b"[" * 50_000,
+    b'{"scene":' * 9000,
     b"x" * 99_999,
 ]
-BEHAVIOURS = ("close", "wait", "drip", "never read", "half", "again")
+
+
+def exact(body: bytes) -> tuple[bytes, bytes]:
+    """A header and a body after it, as clients send them."""
+    return b"Content-Length: %d" % len(body), body
+
+
+def short(body: bytes) -> tuple[bytes, bytes]:
+    """The rest of the body is the beginning of a request."""
+    return b"Content-Length: %d" % (len(body) // 2), body
+
+
+def long(body: bytes) -> tuple[bytes, bytes]:
+    """The body never arrives as a whole."""
+    return b"Content-Length: %d" % (2 * len(body) + 1), body
+
+
+def chunked(body: bytes) -> tuple[bytes, bytes]:
+    """In chunks of seven bytes at most."""
+    pieces = [body[start : start + 7] for start in range(0, min(len(body), 7000), 7)]
+    chunks = (b"%x\r\n%s\r\n" % (len(piece), piece) for piece in pieces)
+    return b"Transfer-Encoding: chunked", b"".join(chunks) + b"0\r\n\r\n"
+
+
+def endless(body: bytes) -> tuple[bytes, bytes]:
+    """In chunks of which the last never comes, with something after the size."""
+    return b"Transfer-Encoding: chunked", b"%x;a=b\r\n%s\r\n" % (len(body), body)
+
+
+def torn(body: bytes) -> tuple[bytes, bytes]:
+    """In chunks whose sizes are none."""
+    return b"Transfer-Encoding: chunked", b"fffffffffffffffff\r\n" + body + b"-1\r\nzz\r\n"
+
+
+def bare(body: bytes) -> tuple[bytes, bytes]:
+    """Without a word about it."""
+    return b"", body
+
+
+FRAMINGS = (exact, exact, short, long, chunked, endless, torn, bare)
+BEHAVIOURS = ("close", "wait", "drip", "never read", "half", "again", "bytes")
 
 
 def request(choose: random.Random) -> bytes:
-    """Return the bytes of a request."""
-    head = b" ".join([choose.choice(METHODS), choose.choice(TARGETS), choose.choice(VERSIONS)])
-    lines = [head, choose.choice(HOSTS), choose.choice(HEADERS), choose.choice(HEADERS)]
-    return b"\r\n".join(line for line in lines if line) + b"\r\n\r\n" + choose.choice(BODIES)
+    """Return the bytes of a request, most parts of which are as clients send them."""
+
+    def part(plain: bytes, others: list[bytes]) -> bytes:
+        return plain if choose.random() < PLAIN else choose.choice(others)
+
+    if choose.random() < 0.5:
+        method, target = part(b"GET", METHODS), choose.choice(TARGETS)
+        framing, body = b"", b""
+    else:
+        method, target = part(b"POST", METHODS), part(choose.choice([b"/jobs", b"/estimate"]), TARGETS)
+        framing, body = choose.choice(FRAMINGS)(choose.choice(BODIES))
+    lines = [
+        b" ".join([method, target, part(b"HTTP/1.1", VERSIONS)]),
+        part(b"Host: localhost", HOSTS),
+        part(b"Content-Type: application/json", HEADERS),
+        part(b"Accept: */*", HEADERS),
+        framing,
+    ]
+    return b"\r\n".join(line for line in lines if line) + b"\r\n\r\n" + body
+
+
+def send(connection: socket.socket, data: bytes, behaviour: str) -> None:
+    """Send a request at once, byte by byte, twenty times, or as the last one."""
+    if behaviour == "bytes":
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        for octet in data[:SINGLE_BYTES]:
+            connection.sendall(bytes([octet]))
+        data = data[SINGLE_BYTES:]
+    connection.sendall(data * (20 if behaviour == "again" else 1))
+    if behaviour == "half":
+        connection.shutdown(socket.SHUT_WR)
 
 
 def attack(port: int, data: bytes, behaviour: str) -> tuple[int, bool]:
@@ -139,9 +211,7 @@ def attack(port: int, data: bytes, behaviour: str) -> tuple[int, bool]:
     answer, ended = b"", behaviour == "close"
     with socket.create_connection(("127.0.0.1", port), timeout=SECONDS) as connection:
         try:
-            connection.sendall(data * (20 if behaviour == "again" else 1))
-            if behaviour == "half":
-                connection.shutdown(socket.SHUT_WR)
+            send(connection, data, behaviour)
             connection.settimeout(0.2)
             deadline = time.monotonic() + (0.5 if behaviour == "close" else SECONDS)
             if behaviour == "never read":
@@ -205,6 +275,8 @@ def main() -> None:
         "MB before, at most, after": [round(value) for value in (before, max(largest), after)],
     }
     print(json.dumps(report, indent=2))
+    if report["tracebacks"]:
+        print(logged)
     for data, behaviour in stayed:
         print(behaviour, data[:200])
     sys.exit(0 if alive and not errors and not stayed and not report["tracebacks"] else 1)

@@ -6,6 +6,7 @@ import json
 import socket
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 
 import httpx2
 import pytest
@@ -16,6 +17,7 @@ from api.http.middleware import SECURITY_HEADERS
 from ensemble.errors import StoreInputError
 from ensemble.store.catalog_tables import RUN_FIELDS, RunRow
 from ensemble.store.filters import condition
+from tests.api.processes import wait_until
 from tests.api.servers import client_of, make_token
 
 JSON = {"Content-Type": "application/json"}
@@ -225,6 +227,18 @@ def status_of(answer: bytes) -> int:
 
 
 HEAD = b"Host: localhost\r\nConnection: close\r\n"
+
+
+def test_a_client_that_goes_away_in_its_body_is_no_error_of_the_server(submitting):
+    head = b"Content-Type: application/json\r\nContent-Length: 9\r\n\r\n{"
+    with socket.create_connection((submitting.base_url.host, submitting.base_url.port)) as connection:
+        connection.sendall(b"POST /jobs HTTP/1.1\r\n" + HEAD + head)
+        connection.shutdown(socket.SHUT_WR)
+        with suppress(ConnectionResetError):
+            connection.recv(1000)
+    counted = 'ensemble_requests_total{method="POST",route="/jobs",status="%d"} 1.0'
+    wait_until(lambda: counted % 400 in submitting.get("/metrics").text.splitlines())
+    assert counted % 500 not in submitting.get("/metrics").text
 
 
 @pytest.mark.parametrize(
