@@ -18,6 +18,7 @@ from typing import Any
 from numba import njit, types
 from numba.core import event
 from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.runtime import rtsys
 from numba.extending import intrinsic
 
 # Without "ninf" and "nnan": a run that diverges must show it.
@@ -81,7 +82,10 @@ class _ToleratedCache(FunctionCache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         try:
-            return super().load_overload(sig, target_context)
+            # Not by `FunctionCache.load_overload`, which first loads all that Numba can compile.  Only
+            # compilation needs that, and does so itself; it takes a third of the start of a run.
+            rtsys.initialize(target_context)
+            return self._load_overload(sig, target_context)
         except Exception:  # whatever a damaged file leads to; the function is compiled instead
             return None
 

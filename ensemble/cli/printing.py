@@ -9,7 +9,6 @@ from textwrap import indent
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import typer
-from rich.text import Text
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -110,4 +109,6 @@ def print_answer(answer: Answer, as_json: bool) -> NoReturn:
 
 
 def _text(cell: RenderableType) -> str:
+    from rich.text import Text
+
     return Text.from_markup(cell).plain if isinstance(cell, str) else str(cell)

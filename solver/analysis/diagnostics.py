@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,15 +10,18 @@ from numpy.typing import NDArray
 from solver.analysis.contacts import CONTACT, clusters
 from solver.analysis.rheology import adhesion_stress, membrane_stress
 from solver.membrane import curve
-from solver.motion.equation import EquationOfMotion, Motion
 from solver.potentials.neighbors import gap
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from solver.motion.equation import EquationOfMotion, Motion
     from solver.scene import Scene, Vesicle
 
+    Measure = Callable[[Motion], float]
+    VesicleMeasure = Callable[[Motion], NDArray[np.float64]]
+
 Array = NDArray[np.float64]
-Measure = Callable[[Motion], float]
-VesicleMeasure = Callable[[Motion], Array]
 
 _LEAST_VESICLES = 3  # of which each is measured on its own
 

@@ -123,5 +123,7 @@ class LineOfCenters(RevolutionTracker):
         return math.atan2(y, x)
 
     def _offset(self, state: Array) -> list[float]:
-        (x, y), (second_x, second_y) = self.membranes.curve_center(state).tolist()
-        return [second_x - x, second_y - y]
+        x, y = self.membranes.center(state).T.tolist()
+        if len(x) == 1:  # the other vesicle is the image
+            return [-2 * x[0], -2 * y[0]]
+        return [x[1] - x[0], y[1] - y[0]]

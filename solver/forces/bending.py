@@ -53,14 +53,10 @@ class Bending:
         (2, M·N, state_size)
         """
         membranes = geometry.membranes
-        points = membranes.points
-        third = differentiation(points, 3)
-        jacobian = np.zeros((2, membranes.count * points, membranes.state_size))
-        for vesicle in range(membranes.count):
-            block = slice(vesicle * points, (vesicle + 1) * points)
-            scale = -membranes.bending_modulus[vesicle] * (2 * np.pi / membranes.length[vesicle]) ** 3
-            np.multiply(third, -scale * geometry.tangents[1, vesicle], out=jacobian[0, block, block])
-            np.multiply(third, scale * geometry.tangents[0, vesicle], out=jacobian[1, block, block])
+        jacobian = np.zeros((2, membranes.count * membranes.points, membranes.state_size))
+        by_vesicle = -membranes.bending_modulus[:, None] * membranes.wavenumber**3
+        scale = np.full(geometry.tangent_angle.shape, by_vesicle)
+        geometry.add_rotation(differentiation(membranes.points, 3), scale, jacobian)
         return jacobian
 
     def energy(self, geometry: Geometry) -> float:
@@ -125,12 +121,9 @@ class BendingOfCircles(Bending):
         """
         jacobian = super().jacobian(geometry)
         points = geometry.membranes.points
-        pull = self._tension * geometry.membranes.wavenumber[:, 0]
-        for vesicle in np.flatnonzero(geometry.membranes.circular):
-            block = slice(vesicle * points, (vesicle + 1) * points)
-            by_tangent = pull[vesicle] * differentiation(points)
-            jacobian[0, block, block] -= by_tangent * geometry.tangents[1, vesicle]
-            jacobian[1, block, block] += by_tangent * geometry.tangents[0, vesicle]
+        by_vesicle = self._tension[:, None] * geometry.membranes.wavenumber
+        pull = np.full(geometry.tangent_angle.shape, by_vesicle)
+        geometry.add_rotation(differentiation(points), pull, jacobian)
         return jacobian
 
 

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from scipy.linalg import lapack
 
 from solver.compilation import compiled
+from solver.membrane.products import multiply, multiply_both
 from solver.membrane.spectral import differentiation
 
 if TYPE_CHECKING:
@@ -94,12 +95,78 @@ class TensionEffect(NamedTuple):
 
 
 @compiled
+def _stretching(velocity: Array, tangents: Array, derivative: Array, out: Array) -> None:
+    """Write x_s · u_s of a velocity (2·M·N,), times the length over 2π, as (M·N,)."""
+    _, count, points = tangents.shape
+    by_x, by_y = np.empty(points), np.empty(points)
+    for vesicle in range(count):
+        first, second = vesicle * points, (count + vesicle) * points
+        x, y = velocity[first : first + points], velocity[second : second + points]
+        multiply_both(derivative, x, y, by_x, by_y)
+        for j in range(points):
+            out[first + j] = tangents[0, vesicle, j] * by_x[j] + tangents[1, vesicle, j] * by_y[j]
+
+
+@compiled
+def _turning(velocity: Array, tangents: Array, derivative: Array, wavenumber: Array, out: Array) -> None:
+    """Write n · u_s of a velocity (2·M·N,) as (M·N,)."""
+    _, count, points = tangents.shape
+    by_x, by_y = np.empty(points), np.empty(points)
+    for vesicle in range(count):
+        first, second = vesicle * points, (count + vesicle) * points
+        x, y = velocity[first : first + points], velocity[second : second + points]
+        multiply_both(derivative, x, y, by_x, by_y)
+        for j in range(points):
+            turned = tangents[0, vesicle, j] * by_y[j] - tangents[1, vesicle, j] * by_x[j]
+            out[first + j] = wavenumber[vesicle, 0] * turned
+
+
+@compiled
+def _point_forces(tension: Array, tangents: Array, derivative: Array, forces: Array) -> None:
+    """Write the forces (2·M·N,) of a tension (M·N,) at the points: (σ x_s)_s times the spacing."""
+    _, count, points = tangents.shape
+    pull_x, pull_y = np.empty(points), np.empty(points)
+    for vesicle in range(count):
+        first, second = vesicle * points, (count + vesicle) * points
+        for j in range(points):
+            pull_x[j] = tension[first + j] * tangents[0, vesicle, j]
+            pull_y[j] = tension[first + j] * tangents[1, vesicle, j]
+        by_x, by_y = forces[first : first + points], forces[second : second + points]
+        multiply_both(derivative, pull_x, pull_y, by_x, by_y)
+        for j in range(points):
+            by_x[j] *= 2.0 * np.pi / points
+            by_y[j] *= 2.0 * np.pi / points
+
+
+@compiled
+def _respond(
+    layer: Array,
+    tangents: Array,
+    derivative: Array,
+    shifts: Array,
+    tension: Array,
+    forces: Array,
+    velocity: Array,
+    response: Array,
+) -> None:
+    """Write the point forces and the velocity (2·M·N,) of a tension σ (M·N,), and A σ."""
+    _, count, points = tangents.shape
+    _point_forces(tension, tangents, derivative, forces)
+    multiply(layer, forces, velocity)
+    _stretching(velocity, tangents, derivative, response)
+    for vesicle in range(count):
+        first = vesicle * points
+        shift = shifts[vesicle] * tension[first : first + points].mean()
+        for i in range(first, first + points):
+            response[i] = shift - response[i] * 2.0 * np.pi / points
+
+
+@compiled
 def _conjugate_gradients(
     layer: Array,
     tangents: Array,
     derivative: Array,
     wavenumber: Array,
-    spacing: Array,
     inverse: Array,
     shifts: Array,
     tolerance: float,
@@ -112,49 +179,86 @@ def _conjugate_gradients(
 ) -> int:
     """Write what `Inextensible` holds; return the number of iterations, or −1 if ``limit`` was not enough.
 
-    ``layer`` is the matrix of the single-layer potential, ``derivative`` the transposed one of
-    differentiation; ``wavenumber`` (M, 1) = 2π/length; ``shifts`` (M,) times the mean tension of each vesicle
-    are added to A σ; ``imposed`` (2, M, N) is the velocity u₀ without tension, and ``natural_rate`` a
-    stretching that counts as large.
+    ``layer`` is the matrix of the single-layer potential, ``derivative`` that of differentiation;
+    ``wavenumber`` (M, 1) = 2π/length; ``shifts`` (M,) times the mean tension of each vesicle are added to
+    A σ; ``imposed`` (2·M·N,) is the velocity u₀ without tension, and ``natural_rate`` a stretching that
+    counts as large.
     """
-    count, points = tension.shape
+    _, count, points = tangents.shape
     size = count * points
-    weight = wavenumber * spacing
-    gradient = np.dot(imposed.reshape(2 * count, points), derivative).reshape(imposed.shape)
-    residual = ((tangents[0] * gradient[0] + tangents[1] * gradient[1]) * weight).reshape(size)
-    weights = natural_rate * spacing
-    natural = np.sqrt(points * np.sum(weights * weights))
-    goal = tolerance * max(np.sqrt(np.dot(residual, residual)), natural)
-    solution = np.zeros(size)
-    flow = imposed.copy().reshape(2 * size)
-    direction = np.dot(inverse, residual)
-    product = np.dot(residual, direction)
-    iteration = 0
-    while np.sqrt(np.dot(residual, residual)) > goal:
+    weight = 2.0 * np.pi / points  # spacing · wavenumber
+    natural = 0.0
+    for vesicle in range(count):
+        natural += points * (natural_rate * weight / wavenumber[vesicle, 0]) ** 2
+    residual, direction, correction, response = np.empty((4, size))
+    forces, change = np.empty(2 * size), np.empty(2 * size)
+    _stretching(imposed, tangents, derivative, residual)
+    square = 0.0
+    for i in range(size):
+        residual[i] *= weight
+        square += residual[i] * residual[i]
+    goal = tolerance * tolerance * max(square, natural)
+    velocity[:] = imposed
+    tension[:] = 0.0
+    product, iteration = np.inf, 0
+    while square > goal:
         if iteration == limit:
             return -1
         iteration += 1
-        pull = (direction.reshape(count, points) * tangents).reshape(2 * count, points)
-        forces = np.dot(pull, derivative).reshape(imposed.shape) * weight
-        change = np.dot(layer, forces.reshape(2 * size))
-        gradient = np.dot(change.reshape(2 * count, points), derivative).reshape(imposed.shape)
-        response = (-(tangents[0] * gradient[0] + tangents[1] * gradient[1]) * weight).reshape(size)
-        for vesicle in range(count):
-            own = slice(vesicle * points, (vesicle + 1) * points)
-            response[own] += shifts[vesicle] * direction[own].mean()
-        step = product / np.dot(direction, response)
-        solution += step * direction
-        flow += step * change
-        residual -= step * response
-        correction = np.dot(inverse, residual)
-        previous = product
-        product = np.dot(residual, correction)
-        direction = correction + (product / previous) * direction
-    tension[:] = solution.reshape(count, points)
-    velocity[:] = flow.reshape(imposed.shape)
-    gradient = np.dot(flow.reshape(2 * count, points), derivative).reshape(imposed.shape)
-    rotation_rate[:] = wavenumber * (tangents[0] * gradient[1] - tangents[1] * gradient[0])
+        multiply(inverse, residual, correction)
+        previous, product = product, 0.0
+        for i in range(size):
+            product += residual[i] * correction[i]
+        for i in range(size):
+            direction[i] = correction[i] + (product / previous * direction[i] if iteration > 1 else 0.0)
+        _respond(layer, tangents, derivative, shifts, direction, forces, change, response)
+        curvature = 0.0
+        for i in range(size):
+            curvature += direction[i] * response[i]
+        step = product / curvature
+        square = 0.0
+        for i in range(size):
+            tension[i] += step * direction[i]
+            residual[i] -= step * response[i]
+            square += residual[i] * residual[i]
+        for i in range(2 * size):
+            velocity[i] += step * change[i]
+    _turning(velocity, tangents, derivative, wavenumber, rotation_rate)
     return iteration
+
+
+@compiled
+def _complete_system(stretching: Array, spacing: Array, shifts: Array) -> None:
+    """Make the matrix of A from the stretching (M·N, M·N) that unit tensions cause, in place.
+
+    ``shifts`` (M,) are relative to a typical element on entry, and what was added on return.
+    """
+    size, points = stretching.shape[0], stretching.shape[0] // spacing.size
+    trace = 0.0
+    for i in range(size):
+        row, scale = stretching[i], -spacing[i // points]
+        for j in range(size):
+            row[j] *= scale
+        trace += row[i]
+    typical = trace / size
+    for vesicle in range(spacing.size):
+        shifts[vesicle] *= typical
+        first = vesicle * points
+        for i in range(points):
+            # Differentiation loses the highest mode, whose tension gets the weight of its neighbors.
+            alternating = typical if i % 2 == 0 else -typical
+            own = stretching[first + i, first : first + points]
+            for j in range(0, points, 2):
+                own[j] += (shifts[vesicle] + alternating) / points
+                own[j + 1] += (shifts[vesicle] - alternating) / points
+
+
+@compiled
+def _mirror(matrix: Array) -> None:
+    """Fill the upper triangle of a symmetric matrix from the lower one."""
+    for i in range(matrix.shape[0]):
+        for j in range(i):
+            matrix[j, i] = matrix[i, j]
 
 
 class Inextensibility:
@@ -209,26 +313,26 @@ class Inextensibility:
         TensionNotFoundError
             If the iteration does not converge even with the inverse of this very geometry.
         """
+        membranes = geometry.membranes
+        scalar, vector = geometry.tangent_angle.shape, geometry.points.shape
+        motion = Inextensible(np.empty(scalar), np.empty(vector), np.empty(scalar))
         for inverse, limit in ((known, 25), (None, 200)):
             if inverse is None:
                 inverse, _ = self.factorize(layer, geometry)
-            membranes = geometry.membranes
-            motion = Inextensible(
-                np.empty(imposed.shape[1:]), np.empty(imposed.shape), np.empty(imposed.shape[1:])
-            )
             iterations = _conjugate_gradients(
                 layer.matrix,
                 geometry.tangents,
-                differentiation(membranes.points).T,
+                differentiation(membranes.points),
                 membranes.wavenumber,
-                membranes.spacing[:, None],
                 inverse.matrix,
                 inverse.shifts,
                 self.tolerance,
                 membranes.natural_rate,
                 limit,
-                imposed,
-                *motion,
+                imposed.ravel(),
+                motion.tension.ravel(),
+                motion.velocity.ravel(),
+                motion.rotation_rate.ravel(),
             )
             if iterations >= 0:
                 self.iterations += iterations
@@ -266,20 +370,12 @@ class Inextensibility:
             by_vesicle[:, :, vesicle] = (own @ forces).reshape(2, -1, points)
         flow = by_vesicle.reshape(2, count * points, -1)
         system, turning = geometry.deformation(flow)
-        system *= -np.repeat(membranes.spacing, points)[:, None]
-        typical = np.trace(system) / (count * points)
-        shifts = typical * np.where(membranes.circular, 1.0, self._elasticity)
-        # Differentiation loses the highest mode, whose tension gets the weight of its neighbors.
-        alternating = np.where(np.arange(points) % 2 == 0, 1.0, -1.0)
-        highest = typical * np.outer(alternating, alternating)
-        for vesicle in range(count):
-            block = slice(vesicle * points, (vesicle + 1) * points)
-            system[block, block] += (shifts[vesicle] + highest) / points
+        shifts = np.where(membranes.circular, 1.0, self._elasticity)
+        _complete_system(system, membranes.spacing, shifts)
         # Only the lower triangle is used: the operator is symmetric up to quadrature error.
         factor, failed = lapack.dpotrf(system.T, lower=0, overwrite_a=1)
         if failed:
             raise TensionNotFoundError("the tension operator is not positive: the membrane is too distorted")
-        triangle, _ = lapack.dpotri(factor, lower=0, overwrite_c=1)  # the other one holds zeros
-        inverse = np.add(triangle, triangle.T, order="C")
-        inverse.flat[:: len(inverse) + 1] = np.diagonal(triangle)
+        inverse = lapack.dpotri(factor, lower=0, overwrite_c=1)[0].T
+        _mirror(inverse)
         return TensionInverse(inverse, shifts), TensionEffect(flow, turning)

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from solver.compilation import compiled
 from solver.membrane import curve
-from solver.membrane.spectral import differentiation, equispaced_angles, integration
+from solver.membrane.products import multiply, multiply_both
+from solver.membrane.spectral import differentiation, integration
 from solver.membrane.symmetry import independent_vesicles
 
 if TYPE_CHECKING:
@@ -257,27 +258,113 @@ class Membranes:
 
 @compiled
 def _place(
-    tangent_angle: Array, centers: Array, wavenumber: Array, integration: Array, multiplicity: int
-) -> tuple[Array, Array, Array, Array]:
-    """Make the arrays of `Geometry`: tangents and points, of the vesicles and of all curves."""
+    tangent_angle: Array,
+    centers: Array,
+    wavenumber: Array,
+    integration: Array,
+    differentiation: Array,
+    curvature: Array,
+    tangents: Array,
+    points: Array,
+    curve_tangents: Array,
+    curve_points: Array,
+) -> None:
+    """Write the arrays of `Geometry`: curvature, tangents and points, of the vesicles and of all curves."""
     count, n = tangent_angle.shape
-    tangents = np.empty((2, count, n))
+    periodic = np.empty(n)
     for vesicle in range(count):
         for j in range(n):
-            tangents[0, vesicle, j] = np.cos(tangent_angle[vesicle, j])
-            tangents[1, vesicle, j] = np.sin(tangent_angle[vesicle, j])
-    points = np.dot(tangents.reshape(2 * count, n), integration.T).reshape(2, count, n)
+            periodic[j] = tangent_angle[vesicle, j] - 2.0 * np.pi * j / n
+        multiply(differentiation, periodic, curvature[vesicle])
+        for j in range(n):
+            curvature[vesicle, j] = wavenumber[vesicle, 0] * (1.0 + curvature[vesicle, j])
+        tx, ty = tangents[0, vesicle], tangents[1, vesicle]
+        for j in range(n):
+            tx[j], ty[j] = np.cos(tangent_angle[vesicle, j]), np.sin(tangent_angle[vesicle, j])
+        multiply_both(integration, tx, ty, points[0, vesicle], points[1, vesicle])
+        for component in range(2):
+            own = points[component, vesicle]
+            for j in range(n):
+                own[j] = own[j] / wavenumber[vesicle, 0] + centers[component, vesicle]
+    if curve_points.shape[1] == count:
+        return
     for component in range(2):
         for vesicle in range(count):
             for j in range(n):
-                points[component, vesicle, j] /= wavenumber[vesicle, 0]
-                points[component, vesicle, j] += centers[component, vesicle]
-    if multiplicity == 1:
-        return tangents, points, tangents, points
-    curve_tangents, curve_points = np.empty((2, 2 * count, n)), np.empty((2, 2 * count, n))
-    curve_tangents[:, :count], curve_tangents[:, count:] = tangents, -tangents
-    curve_points[:, :count], curve_points[:, count:] = points, -points
-    return tangents, points, curve_tangents, curve_points
+                curve_tangents[component, vesicle, j] = tangents[component, vesicle, j]
+                curve_tangents[component, count + vesicle, j] = -tangents[component, vesicle, j]
+                curve_points[component, vesicle, j] = points[component, vesicle, j]
+                curve_points[component, count + vesicle, j] = -points[component, vesicle, j]
+
+
+@compiled
+def _differentiate(values: Array, matrix: Array, wavenumber: Array, order: int, derivative: Array) -> None:
+    """Write the derivatives (k, M, N) of values by arclength, with the matrix of differentiation."""
+    for k in range(values.shape[0]):
+        for vesicle in range(values.shape[1]):
+            own, scale = derivative[k, vesicle], wavenumber[vesicle, 0] ** order
+            multiply(matrix, values[k, vesicle], own)
+            for j in range(own.size):
+                own[j] *= scale
+
+
+@compiled
+def _combine_by_state(
+    by_points: Array, integrated: Array, tangents: Array, wavenumber: Array, result: Array
+) -> None:
+    """Write `Geometry.by_state` of derivatives and their integrals along the membranes."""
+    _, count, points = tangents.shape
+    for component in range(2):
+        for row in range(result.shape[1]):
+            by_state = result[component, row]
+            by_x, by_y = by_points[component, row, 0], by_points[component, row, 1]
+            of_x, of_y = integrated[component, row, 0], integrated[component, row, 1]
+            for vesicle in range(count):
+                first, scale = vesicle * points, 1.0 / wavenumber[vesicle, 0]
+                tx, ty = tangents[0, vesicle], tangents[1, vesicle]
+                own = by_state[first : first + points]
+                own_x, own_y = of_x[first : first + points], of_y[first : first + points]
+                for j in range(points):
+                    own[j] = scale * (tx[j] * own_y[j] - ty[j] * own_x[j])
+                total_x = total_y = 0.0
+                for j in range(first, first + points):
+                    total_x += by_x[j]
+                    total_y += by_y[j]
+                by_state[count * points + vesicle] = total_x
+                by_state[count * (points + 1) + vesicle] = total_y
+
+
+@compiled
+def _add_rotation(matrix: Array, scale: Array, tangents: Array, out: Array) -> None:
+    """Add what `Geometry.add_rotation` adds."""
+    count, points = scale.shape
+    for vesicle in range(count):
+        first = vesicle * points
+        tx, ty, own_scale = tangents[0, vesicle], tangents[1, vesicle], scale[vesicle]
+        for i in range(points):
+            row = matrix[i]
+            of_x, of_y = out[0, first + i, first : first + points], out[1, first + i, first : first + points]
+            for j in range(points):
+                scaled = row[j] * own_scale[j]
+                of_x[j] -= scaled * ty[j]
+                of_y[j] += scaled * tx[j]
+
+
+@compiled
+def _combine_gradient(
+    gradient: Array, tangents: Array, wavenumber: Array, stretching: Array, turning: Array
+) -> None:
+    """Write a `Deformation` from derivatives (2, M·N, columns) along the membranes."""
+    points = tangents.shape[2]
+    for i in range(stretching.shape[0]):
+        vesicle, j = i // points, i % points
+        tx = tangents[0, vesicle, j] * wavenumber[vesicle, 0]
+        ty = tangents[1, vesicle, j] * wavenumber[vesicle, 0]
+        along_x, along_y = gradient[0, i], gradient[1, i]
+        stretched, turned = stretching[i], turning[i]
+        for column in range(along_x.size):
+            stretched[column] = tx * along_x[column] + ty * along_y[column]
+            turned[column] = tx * along_y[column] - ty * along_x[column]
 
 
 @compiled
@@ -317,6 +404,8 @@ class Geometry:
     ----------
     tangent_angle : (M, N)
     centers : (2, M)
+    curvature : (M, N)
+        θ_s; positive for a circle.
     tangents, points : (2, M, N)
     curve_tangents, curve_points : (2, C, N)
         With the images.
@@ -324,14 +413,26 @@ class Geometry:
 
     def __init__(self, membranes: Membranes, state: Array) -> None:
         self.membranes = membranes
-        self.tangent_angle = membranes.tangent_angle(state)
-        self.centers = state[self.tangent_angle.size :].reshape(2, membranes.count)
-        self.tangents, self.points, self.curve_tangents, self.curve_points = _place(
+        shape = membranes.count, membranes.points
+        size = membranes.count * membranes.points
+        self.tangent_angle = state[:size].reshape(shape)
+        self.centers = state[size:].reshape(2, membranes.count)
+        self.curvature = np.empty(shape)
+        self.tangents, self.points = np.empty((2, 2, *shape))
+        self.curve_tangents, self.curve_points = self.tangents, self.points
+        if membranes.multiplicity > 1:
+            self.curve_tangents, self.curve_points = np.empty((2, 2, membranes.curves, membranes.points))
+        _place(
             self.tangent_angle,
             self.centers,
             membranes.wavenumber,
             integration(membranes.points),
-            membranes.multiplicity,
+            differentiation(membranes.points),
+            self.curvature,
+            self.tangents,
+            self.points,
+            self.curve_tangents,
+            self.curve_points,
         )
 
     @property
@@ -355,13 +456,6 @@ class Geometry:
         points, tangents = self.points.swapaxes(0, 1), self.tangents.swapaxes(0, 1)
         return curve.area(points, tangents, self.membranes.length)
 
-    @cached_property
-    def curvature(self) -> Array:
-        """Curvature θ_s, (M, N); positive for a circle."""
-        points, wavenumber = self.membranes.points, self.membranes.wavenumber
-        periodic = self.tangent_angle - equispaced_angles(points)
-        return wavenumber * (1 + periodic @ differentiation(points).T)
-
     def arclength_derivative(self, values: Array, order: int = 1) -> Array:
         """Differentiate by arclength.
 
@@ -374,10 +468,11 @@ class Geometry:
         -------
         (..., M, N)
         """
-        points = self.membranes.points
-        derivative: Array = values.reshape(-1, points) @ differentiation(points, order).T
-        derivative = derivative.reshape(values.shape)
-        derivative *= self.membranes.wavenumber**order
+        derivative = np.empty(values.shape)
+        membranes = self.membranes
+        shape = -1, membranes.count, membranes.points
+        matrix = differentiation(membranes.points, order)
+        _differentiate(values.reshape(shape), matrix, membranes.wavenumber, order, derivative.reshape(shape))
         return derivative
 
     def by_state(self, by_points: Array) -> Array:
@@ -393,17 +488,23 @@ class Geometry:
         -------
         (2, rows, state_size)
         """
-        count, points = self.membranes.count, self.membranes.points
-        size, rows = count * points, by_points.shape[1]
+        points, rows = self.membranes.points, by_points.shape[1]
         result = np.empty((2, rows, self.membranes.state_size))
-        integrated = (by_points.reshape(-1, points) @ integration(points)).reshape(2, rows, 2, size)
-        scaled_x, scaled_y = (self.tangents / self.membranes.wavenumber).reshape(2, -1)
-        by_angle = result[:, :, :size]
-        np.multiply(integrated[:, :, 1], scaled_x, out=by_angle)
-        integrated[:, :, 0] *= scaled_y
-        by_angle -= integrated[:, :, 0]
-        result[:, :, size:] = (by_points.reshape(-1, points) @ np.ones(points)).reshape(2, rows, 2 * count)
+        integrated = (by_points.reshape(-1, points) @ integration(points)).reshape(by_points.shape)
+        _combine_by_state(by_points, integrated, self.tangents, self.membranes.wavenumber, result)
         return result
+
+    def add_rotation(self, matrix: Array, scale: Array, out: Array) -> None:
+        """Add the derivative of a matrix times (scale · tangents) by the state: tangents rotate.
+
+        Parameters
+        ----------
+        matrix : (N, N)
+        scale : (M, N)
+        out : (2, M·N, state_size)
+            Changed in place.
+        """
+        _add_rotation(matrix, scale, self.tangents, out)
 
     def deformation(self, velocity: Array) -> Deformation:
         """Return how velocities deform the membranes.
@@ -418,13 +519,7 @@ class Geometry:
         Deformation
         """
         count, points = self.membranes.count, self.membranes.points
-        gradient = differentiation(points) @ velocity.reshape(2, count, points, -1)
-        along_x, along_y = gradient.reshape(velocity.shape)
-        tangent_x, tangent_y = (self.tangents * self.membranes.wavenumber).reshape(2, -1, 1)
-        stretching = tangent_x * along_x
-        turning = tangent_x * along_y
-        along_x *= tangent_y
-        along_y *= tangent_y
-        stretching += along_y
-        turning -= along_x
-        return Deformation(stretching, turning)
+        gradient = (differentiation(points) @ velocity.reshape(2, count, points, -1)).reshape(velocity.shape)
+        deformation = Deformation(*np.empty((2, *velocity.shape[1:])))
+        _combine_gradient(gradient, self.tangents, self.membranes.wavenumber, *deformation)
+        return deformation

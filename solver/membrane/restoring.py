@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.compilation import compiled
+from solver.membrane.products import project_out, sum_rows
 from solver.membrane.spectral import highest_modes, integration
 
 if TYPE_CHECKING:
@@ -59,16 +60,18 @@ def shape_rates(vesicles: Sequence[Vesicle], scene: Scene) -> Array:
 
 
 @compiled
-def _solve(matrix: Array, right: Array) -> Array:
-    """Return the solution of a symmetric positive system of three equations, by Cramer's rule."""
-    a, b, c = matrix[0, 0], matrix[0, 1], matrix[0, 2]
-    d, e, f = matrix[1, 1], matrix[1, 2], matrix[2, 2]
-    adjugate = np.empty((3, 3))
-    adjugate[0, 0], adjugate[0, 1], adjugate[0, 2] = d * f - e * e, c * e - b * f, b * e - c * d
-    adjugate[1, 1], adjugate[1, 2], adjugate[2, 2] = a * f - c * c, b * c - a * e, a * d - b * b
-    adjugate[1, 0], adjugate[2, 0], adjugate[2, 1] = adjugate[0, 1], adjugate[0, 2], adjugate[1, 2]
-    determinant = a * adjugate[0, 0] + b * adjugate[0, 1] + c * adjugate[0, 2]
-    return np.dot(adjugate, right) / determinant
+def _multipliers(products: Array, deviations: Array) -> Array:
+    """Return Γ⁻¹ g: the solution of a symmetric positive system of three equations, by Cramer's rule."""
+    a, b, c = products[0, 0], products[0, 1], products[0, 2]
+    d, e, f = products[1, 1], products[1, 2], products[2, 2]
+    first, second, third = d * f - e * e, c * e - b * f, b * e - c * d
+    determinant = a * first + b * second + c * third
+    x, y, z = deviations[0], deviations[1], deviations[2]
+    solution = np.empty(3)
+    solution[0] = (first * x + second * y + third * z) / determinant
+    solution[1] = (second * x + (a * f - c * c) * y + (b * c - a * e) * z) / determinant
+    solution[2] = (third * x + (b * c - a * e) * y + (a * d - b * b) * z) / determinant
+    return solution
 
 
 @compiled
@@ -78,13 +81,19 @@ def _gradients(tangents: Array, offsets: Array, held: Array) -> tuple[Array, Arr
     ``tangents`` and ``offsets`` are t and ξ (2, N), ``held`` (N, k) is an orthonormal basis of these modes.
     """
     points = tangents.shape[1]
-    gradients = np.empty((3, points))
+    gradients, products = np.empty((3, points)), np.empty((3, 3))
     for j in range(points):
         gradients[0, j] = 2 * (tangents[0, j] * offsets[0, j] + tangents[1, j] * offsets[1, j])
         gradients[1, j] = -tangents[1, j]
         gradients[2, j] = tangents[0, j]
-    gradients -= np.dot(np.dot(gradients, held), held.T)
-    products = np.dot(gradients, gradients.T) / points
+    for row in range(3):
+        project_out(held, gradients[row])
+    for row in range(3):
+        for column in range(3):
+            total = 0.0
+            for j in range(points):
+                total += gradients[row, j] * gradients[column, j]
+            products[row, column] = total / points
     products[0, 0] += _CIRCLE
     return gradients, products
 
@@ -92,26 +101,106 @@ def _gradients(tangents: Array, offsets: Array, held: Array) -> tuple[Array, Arr
 @compiled
 def _deviations(tangents: Array, offsets: Array, reduced_area: float) -> Array:
     """Return g (3,) of a membrane."""
-    deviations = np.zeros(3)
-    for j in range(tangents.shape[1]):
-        deviations[0] += offsets[0, j] * tangents[1, j] - offsets[1, j] * tangents[0, j]
-        deviations[1] += tangents[0, j]
-        deviations[2] += tangents[1, j]
-    deviations /= tangents.shape[1]
-    deviations[0] -= reduced_area
+    points = tangents.shape[1]
+    area = mean_x = mean_y = 0.0
+    for j in range(points):
+        area += offsets[0, j] * tangents[1, j] - offsets[1, j] * tangents[0, j]
+        mean_x += tangents[0, j]
+        mean_y += tangents[1, j]
+    deviations = np.empty(3)
+    deviations[0], deviations[1], deviations[2] = (
+        area / points - reduced_area,
+        mean_x / points,
+        mean_y / points,
+    )
     return deviations
 
 
 @compiled
-def _rate(tangents: Array, offsets: Array, reduced_area: Array, strength: Array, held: Array) -> Array:
-    """Return the term for all membranes, (M, N)."""
-    rate = np.empty((tangents.shape[1], tangents.shape[2]))
+def _write_rate(
+    tangents: Array,
+    points: Array,
+    centers: Array,
+    wavenumber: Array,
+    reduced_area: Array,
+    strength: Array,
+    held: Array,
+    rate: Array,
+) -> None:
+    """Write the term for all membranes, (M, N)."""
+    own, about = np.empty((2, tangents.shape[2])), np.empty((2, tangents.shape[2]))
     for vesicle in range(rate.shape[0]):
-        own, about = tangents[:, vesicle].copy(), offsets[:, vesicle].copy()
+        for component in range(2):
+            for j in range(own.shape[1]):
+                own[component, j] = tangents[component, vesicle, j]
+                offset = points[component, vesicle, j] - centers[component, vesicle]
+                about[component, j] = offset * wavenumber[vesicle, 0]
         gradients, products = _gradients(own, about, held)
-        multipliers = _solve(products, _deviations(own, about, reduced_area[vesicle]))
-        rate[vesicle] = -strength[vesicle] * np.dot(multipliers, gradients)
-    return rate
+        multipliers = _multipliers(products, _deviations(own, about, reduced_area[vesicle]))
+        for j in range(own.shape[1]):
+            total = 0.0
+            for row in range(3):
+                total += multipliers[row] * gradients[row, j]
+            rate[vesicle, j] = -strength[vesicle] * total
+
+
+@compiled
+def _write_jacobian(
+    tangents: Array,
+    offsets: Array,
+    reduced_area: float,
+    strength: float,
+    integration: Array,
+    held: Array,
+    jacobian: Array,
+) -> None:
+    """Write the derivative (N, N) of the term of one membrane by its tangent angles."""
+    points = tangents.shape[1]
+    cosine, sine = tangents[0], tangents[1]
+    gradients, products = _gradients(tangents, offsets, held)
+    multipliers = _multipliers(products, _deviations(tangents, offsets, reduced_area))
+    # Second derivatives of the area, and the diagonal of the others.
+    of_area = jacobian
+    for i in range(points):
+        row, of_row = of_area[i], integration[i]
+        for j in range(points):
+            row[j] = 2 * of_row[j] * (sine[i] * cosine[j] - cosine[i] * sine[j])
+        row[i] += 2 * (cosine[i] * offsets[1, i] - sine[i] * offsets[0, i])
+    by_area = np.empty((3, points))
+    for k in range(3):
+        sum_rows(gradients[k], of_area, by_area[k])
+    solutions, by_angle = np.empty((3, points)), np.empty(3)
+    diagonal = np.empty(points)
+    for j in range(points):
+        combined = along_area = 0.0
+        for k in range(3):
+            combined += multipliers[k] * gradients[k, j]
+            along_area += multipliers[k] * by_area[k, j]
+        diagonal[j] = multipliers[1] * cosine[j] + multipliers[2] * sine[j]
+        by_angle[0] = 2 * (cosine[j] * offsets[0, j] + sine[j] * offsets[1, j]) - along_area
+        by_angle[1] = combined * cosine[j] - sine[j]
+        by_angle[2] = combined * sine[j] + cosine[j]
+        for k in range(3):
+            by_angle[k] -= multipliers[0] * by_area[k, j] - gradients[k, j] * diagonal[j]
+            by_angle[k] /= points
+        solutions[:, j] = _multipliers(products, by_angle)
+    for i in range(points):
+        row = jacobian[i]
+        for j in range(points):
+            row[j] *= multipliers[0]
+        row[i] -= diagonal[i]
+        for k in range(3):
+            for j in range(points):
+                row[j] += gradients[k, i] * solutions[k, j]
+    for k in range(held.shape[1]):
+        share = by_area[0]
+        sum_rows(held[:, k], jacobian, share)
+        for i in range(points):
+            for j in range(points):
+                jacobian[i, j] -= held[i, k] * share[j]
+    for i in range(points):
+        for j in range(points):
+            jacobian[i, j] *= -strength
 
 
 @dataclass(frozen=True)
@@ -174,8 +263,17 @@ class Restoring:
         (M, N)
             Without the highest modes, which stay as they are.
         """
-        held = highest_modes(geometry.membranes.points)
-        rate: Array = _rate(geometry.tangents, _offsets(geometry), self.reduced_area, self.strength, held)
+        rate = np.empty_like(geometry.tangent_angle)
+        _write_rate(
+            geometry.tangents,
+            geometry.points,
+            geometry.centers,
+            geometry.membranes.wavenumber,
+            self.reduced_area,
+            self.strength,
+            highest_modes(geometry.membranes.points),
+            rate,
+        )
         return rate
 
     def jacobian(self, geometry: Geometry, vesicle: int) -> Array:
@@ -191,26 +289,17 @@ class Restoring:
         (N, N)
         """
         points = geometry.membranes.points
-        held = highest_modes(points)
-        own = np.ascontiguousarray(geometry.tangents[:, vesicle])
-        about = np.ascontiguousarray(_offsets(geometry)[:, vesicle])
-        gradients, products = _gradients(own, about, held)
-        multipliers = _solve(products, _deviations(own, about, self.reduced_area[vesicle]))
-        combined = multipliers @ gradients
-        cosine, sine = own
-        # Second derivatives of the deviations, each (N, N) or the diagonal of such.
-        products_of_tangents = np.outer(2 * sine, cosine)
-        of_area = integration(points) * (products_of_tangents - products_of_tangents.T)
-        diagonal = slice(None, None, points + 1)
-        of_area.flat[diagonal] += 2 * (cosine * about[1] - sine * about[0])
-        of_all = multipliers[0] * of_area
-        of_all.flat[diagonal] -= multipliers[1] * cosine + multipliers[2] * sine
-        by_angle = np.stack([2 * (cosine * about[0] + sine * about[1]), -sine, cosine])
-        by_angle -= np.stack([combined @ of_area, -combined * cosine, -combined * sine])
-        by_angle -= gradients @ of_all
-        change = of_all + gradients.T @ np.linalg.solve(products, by_angle / points)
-        change -= held @ (held.T @ change)
-        return np.asarray(-self.strength[vesicle] * change)
+        change = np.empty((points, points))
+        _write_jacobian(
+            np.ascontiguousarray(geometry.tangents[:, vesicle]),
+            np.ascontiguousarray(_offsets(geometry)[:, vesicle]),
+            float(self.reduced_area[vesicle]),
+            float(self.strength[vesicle]),
+            integration(points),
+            highest_modes(points),
+            change,
+        )
+        return change
 
 
 def _offsets(geometry: Geometry) -> Array:

@@ -214,6 +214,13 @@ def tail(values: Array) -> Array:
     -------
     (...)
     """
-    spectrum = np.fft.rfft(values, axis=-1) / values.shape[-1]
-    start = (2 * (spectrum.shape[-1] - 1)) // 3
-    return 2 * np.sqrt(np.sum(np.abs(spectrum[..., start:]) ** 2, axis=-1))
+    return np.asarray(2 * np.linalg.norm(values @ _last_third(values.shape[-1]), axis=-1))
+
+
+@cache
+def _last_third(points: int) -> Array:
+    """Return what maps values to real and imaginary parts of the last third of their spectrum, (N, ·)."""
+    half = points // 2
+    modes = np.arange(2 * half // 3, half + 1)
+    angles = np.outer(equispaced_angles(points), modes)
+    return _frozen(np.concatenate([np.cos(angles), np.sin(angles)], axis=1) / points)

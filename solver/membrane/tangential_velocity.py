@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.compilation import compiled
+from solver.membrane.products import project_out
 
 Array = NDArray[np.float64]
 
@@ -23,87 +24,85 @@ _CIRCLE = 1e-3**4  # η⁴: a vesicle whose curvature varies by less than a thou
 
 
 @compiled
-def tangential_speed_weights(curvature: Array) -> Array:
-    """Return the weights of n · u_s whose sum over a membrane is its tangential speed.
+def tangential_speed_weights(curvature: Array, weights: Array) -> None:
+    """Write the weights of n · u_s whose sum over a membrane is its tangential speed.
 
     Parameters
     ----------
-    curvature : (M, N)
-
-    Returns
-    -------
-    (M, N)
+    curvature : (N,)
+    weights : (N,)
+        Written to.
     """
-    weights = np.empty_like(curvature)
-    for vesicle in range(curvature.shape[0]):
-        kappa = curvature[vesicle]
-        mean = kappa.mean()
-        varying = kappa - mean
-        q = np.mean(varying * varying) * varying + _CIRCLE * mean**3
-        weights[vesicle] = -q / np.sum(q * kappa)
-    return weights
+    mean = curvature.mean()
+    square = 0.0
+    for j in range(weights.size):
+        square += (curvature[j] - mean) ** 2
+    square /= weights.size
+    total = 0.0
+    for j in range(weights.size):
+        weights[j] = square * (curvature[j] - mean) + _CIRCLE * mean**3
+        total += weights[j] * curvature[j]
+    for j in range(weights.size):
+        weights[j] /= -total
 
 
 @compiled
-def tangential_speed(curvature: Array, rotation_rate: Array) -> Array:
-    """Return the speed of the points along each membrane.
+def tangential_speed_by_curvature(curvature: Array, rotation_rate: Array, derivative: Array) -> float:
+    """Write the derivative of a membrane's tangential speed by its curvature, at fixed n · u_s.
 
     Parameters
     ----------
-    curvature : (M, N)
-    rotation_rate : (M, N)
-        How fast the material turns, n · u_s.
+    curvature, rotation_rate : (N,)
+        The latter is how fast the material turns, n · u_s.
+    derivative : (N,)
+        Written to.
 
     Returns
     -------
-    (M,)
+    float
+        The speed.
     """
-    return np.sum(tangential_speed_weights(curvature) * rotation_rate, axis=1)
-
-
-@compiled
-def tangential_speed_by_curvature(curvature: Array, rotation_rate: Array) -> Array:
-    """Return the derivative of each vesicle's `tangential_speed` by its curvature, at fixed n · u_s.
-
-    Parameters
-    ----------
-    curvature, rotation_rate : (M, N)
-        As for `tangential_speed`.
-
-    Returns
-    -------
-    (M, N)
-    """
-    derivative = np.empty_like(curvature)
-    for vesicle in range(curvature.shape[0]):
-        kappa, w = curvature[vesicle], rotation_rate[vesicle]
-        mean, mean_w = kappa.mean(), w.mean()
-        varying = kappa - mean
-        square = np.mean(varying * varying)
-        q = square * varying + _CIRCLE * mean**3
-        total = np.sum(q * kappa)
-        speed = -np.sum(q * w) / total
+    size = curvature.size
+    mean, mean_w = curvature.mean(), rotation_rate.mean()
+    square = product = 0.0
+    for j in range(size):
+        square += (curvature[j] - mean) ** 2
+        product += (curvature[j] - mean) * rotation_rate[j]
+    square, product = square / size, product / size
+    shift = _CIRCLE * mean**3
+    total = speed = 0.0
+    for j in range(size):
+        q = square * (curvature[j] - mean) + shift
+        total += q * curvature[j]
+        speed -= q * rotation_rate[j]
+    speed /= total
+    for j in range(size):
+        varying = curvature[j] - mean
         # Derivatives of N⟨w, q⟩ and N⟨κ, q⟩ by the curvature.
-        numerator = 2 * np.mean(varying * w) * varying + square * (w - mean_w)
+        numerator = 2 * product * varying + square * (rotation_rate[j] - mean_w)
         numerator += 3 * _CIRCLE * mean**2 * mean_w
-        denominator = 3 * square * varying + 3 * _CIRCLE * mean**3 + q
-        derivative[vesicle] = -(numerator + speed * denominator) / total
-    return derivative
+        denominator = 4 * square * varying + 4 * shift
+        derivative[j] = -(numerator + speed * denominator) / total
+    return speed
 
 
 @compiled
 def add_tangential_motion(curvature: Array, rotation_rate: Array, held: Array) -> None:
-    """Make θ_t of n · u_s, in place: add c·θ_s and take off modes that stay as they are.
+    """Make θ_t of n · u_s on a membrane, in place: add c·θ_s and take off modes that stay as they are.
 
     Parameters
     ----------
-    curvature : (M, N)
-    rotation_rate : (M, N)
+    curvature : (N,)
+    rotation_rate : (N,)
         On entry n · u_s, on return θ_t.
     held : (N, k)
         Orthonormal basis of the modes that stay.
     """
-    speed = tangential_speed(curvature, rotation_rate)
-    for vesicle in range(rotation_rate.shape[0]):
-        rotation_rate[vesicle] += speed[vesicle] * curvature[vesicle]
-    rotation_rate -= np.dot(np.dot(rotation_rate, held), held.T)
+    weights = np.empty(curvature.size)
+    tangential_speed_weights(curvature, weights)
+    speed = 0.0
+    for j in range(weights.size):
+        speed += weights[j] * rotation_rate[j]
+    for j in range(weights.size):
+        rotation_rate[j] += speed * curvature[j]
+    project_out(held, rotation_rate)

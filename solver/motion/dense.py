@@ -14,14 +14,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.compilation import compiled
 from solver.forces.tension import TensionInverse
 from solver.membrane.geometry import Geometry, Membranes
+from solver.membrane.products import sum_rows
 from solver.membrane.spectral import differentiation, highest_modes, integration
-from solver.membrane.tangential_velocity import (
-    tangential_speed,
-    tangential_speed_by_curvature,
-    tangential_speed_weights,
-)
+from solver.membrane.tangential_velocity import tangential_speed_by_curvature, tangential_speed_weights
 from solver.motion.equation import Motion, conserved_quantities, restored_motion, saved_motion
 from solver.motion.jacobian import DenseJacobian
 from solver.potentials.proximity import Closeness
@@ -219,7 +217,9 @@ class DenseEquation:
         geometry = motion.geometry
         self._assemble(geometry)
         force = self.bending.jacobian(geometry)
-        self._add_rotation_of_tension(motion, force)
+        # The tension's force changes when the membrane rotates, by ∂/∂s (σ n δθ).
+        scaled = motion.tension * self.membranes.wavenumber
+        geometry.add_rotation(differentiation(self.membranes.points), scaled, force)
         if adhesion is not None:
             force += adhesion
         weights = np.repeat(self.membranes.spacing, self.membranes.points)[:, None]
@@ -232,8 +232,8 @@ class DenseEquation:
             velocity += self.contrast.jacobian(geometry, motion.velocity)
             velocity = self.contrast.velocity(velocity)
         stretching, turning = geometry.deformation(velocity)
-        every_point = np.arange(motion.rotation_rate.size)
-        stretching[every_point, every_point] += motion.rotation_rate.ravel()
+        size, columns = stretching.shape
+        stretching.ravel()[: size * columns : columns + 1] += motion.rotation_rate.ravel()
         stretching *= weights
         inverse, effect = self.inextensibility.factorize(self.contrast or self.layer, geometry)
         tension = inverse.matrix @ stretching
@@ -268,16 +268,14 @@ class DenseEquation:
         -------
         (2, M·N, state_size)
         """
-        count, points = self.membranes.count, self.membranes.points
-        by_state = np.zeros((2, count * points, self.membranes.state_size))
-        matrix = integration(points)
+        count, size = self.membranes.count, self.membranes.count * self.membranes.points
+        by_state = np.zeros((2, size, self.membranes.state_size))
+        scale = np.full(geometry.tangent_angle.shape, 1 / self.membranes.wavenumber)
+        geometry.add_rotation(integration(self.membranes.points), scale, by_state)
+        by_vesicle = by_state.reshape(2, count, -1, self.membranes.state_size)
         for vesicle in range(count):
-            block = slice(vesicle * points, (vesicle + 1) * points)
-            scale = self.membranes.length[vesicle] / (2 * np.pi)
-            np.multiply(matrix, -scale * geometry.tangents[1, vesicle], out=by_state[0, block, block])
-            np.multiply(matrix, scale * geometry.tangents[0, vesicle], out=by_state[1, block, block])
-            by_state[0, block, count * points + vesicle] = 1.0
-            by_state[1, block, count * points + count + vesicle] = 1.0
+            by_vesicle[0, vesicle, :, size + vesicle] = 1.0
+            by_vesicle[1, vesicle, :, size + count + vesicle] = 1.0
         return by_state
 
     def _evaluate_for_step(self, state: Array) -> Motion:
@@ -335,18 +333,6 @@ class DenseEquation:
             density += motion.adhesion
         return density * self.membranes.spacing[:, None]
 
-    def _add_rotation_of_tension(self, motion: Motion, force: Array) -> None:
-        """Add how the tension's force changes when the membrane rotates, ∂/∂s (σ n δθ)."""
-        points = self.membranes.points
-        matrix = differentiation(points)
-        geometry = motion.geometry
-        for vesicle in range(self.membranes.count):
-            block = slice(vesicle * points, (vesicle + 1) * points)
-            scaled = motion.tension[vesicle] * (2 * np.pi / self.membranes.length[vesicle])
-            tx, ty = geometry.tangents[:, vesicle]
-            force[0, block, block] -= matrix * (scaled * ty)
-            force[1, block, block] += matrix * (scaled * tx)
-
     def _flow_jacobian(self, flow: ImposedFlow, geometry: Geometry) -> Array:
         """Return derivatives of the imposed velocity at the points by the state, (2, M·N, state_size)."""
         count, size = self.membranes.count, self.membranes.state_size
@@ -368,18 +354,54 @@ class DenseEquation:
     def _angle_rate_columns(self, motion: Motion, turning: Array) -> Array:
         """Return the rates of the tangent angles for the derivatives of n · u_s by the state, in place."""
         points = self.membranes.points
-        geometry, result = motion.geometry, turning
-        curvature, highest = geometry.curvature, highest_modes(points)
-        direction = tangential_speed_weights(curvature)
-        speed = tangential_speed(curvature, motion.rotation_rate)
-        by_curvature = tangential_speed_by_curvature(curvature, motion.rotation_rate)
-        for vesicle in range(self.membranes.count):
-            block = slice(vesicle * points, (vesicle + 1) * points)
-            result[block] += np.outer(curvature[vesicle], direction[vesicle] @ result[block])
-            to_curvature = self.membranes.wavenumber[vesicle] * differentiation(points)
-            result[block, block] += speed[vesicle] * to_curvature
-            result[block, block] += np.outer(curvature[vesicle], by_curvature[vesicle] @ to_curvature)
-            result[block] -= highest @ (highest.T @ result[block])
-            if self.restoring:
-                result[block, block] += self.restoring.jacobian(geometry, vesicle)
-        return result
+        _add_tangential_columns(
+            motion.geometry.curvature,
+            motion.rotation_rate,
+            self.membranes.wavenumber,
+            differentiation(points),
+            highest_modes(points),
+            turning,
+        )
+        if self.restoring:
+            for vesicle in range(self.membranes.count):
+                block = slice(vesicle * points, (vesicle + 1) * points)
+                turning[block, block] += self.restoring.jacobian(motion.geometry, vesicle)
+        return turning
+
+
+@compiled
+def _add_tangential_columns(
+    curvature: Array,
+    rotation_rate: Array,
+    wavenumber: Array,
+    differentiation: Array,
+    held: Array,
+    columns: Array,
+) -> None:
+    """Turn derivatives of n · u_s by the state, (M·N, S), into those of `add_tangential_motion`, in place."""
+    count, points = curvature.shape
+    weights, by_curvature, by_angle = np.empty(points), np.empty(points), np.empty(points)
+    total = np.empty(columns.shape[1])
+    for vesicle in range(count):
+        own = columns[vesicle * points : (vesicle + 1) * points]
+        kappa, scale = curvature[vesicle], wavenumber[vesicle, 0]
+        tangential_speed_weights(kappa, weights)
+        speed = tangential_speed_by_curvature(kappa, rotation_rate[vesicle], by_curvature)
+        sum_rows(weights, own, total)
+        sum_rows(by_curvature, differentiation, by_angle)
+        first = vesicle * points
+        for j in range(points):
+            total[first + j] += scale * by_angle[j]
+        for i in range(points):
+            row, along = own[i], kappa[i]
+            for j in range(row.size):
+                row[j] += along * total[j]
+            of_own, derivative = row[first : first + points], differentiation[i]
+            for j in range(points):
+                of_own[j] += speed * scale * derivative[j]
+        for k in range(held.shape[1]):
+            sum_rows(held[:, k], own, total)
+            for i in range(points):
+                row, along = own[i], held[i, k]
+                for j in range(row.size):
+                    row[j] -= along * total[j]

@@ -17,11 +17,13 @@ which recording asks for, reads it and leaves it as it is.  What is recorded nev
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.compilation import compiled
 from solver.membrane.spectral import highest_modes
 from solver.membrane.tangential_velocity import add_tangential_motion
 
@@ -87,18 +89,33 @@ class Motion:
     adhesion: Array | None
     restoring: Array | None
 
-    @property
+    @cached_property
     def rate(self) -> Array:
         """Rate of change of the state, (state_size,)."""
-        # The two highest modes of the tangent angle stay as they are: their tangents alias onto a mode whose
-        # derivative vanishes, so that bending does not damp them, and the tangential velocity of the points
-        # would slowly fill them.
-        angle_rate = self.rotation_rate.copy()
-        points = angle_rate.shape[1]
-        add_tangential_motion(self.geometry.curvature, angle_rate, highest_modes(points))
+        rate = np.empty(self.rotation_rate.size + 2 * len(self.rotation_rate))
+        highest = highest_modes(self.rotation_rate.shape[1])
+        _write_rate(self.geometry.curvature, self.rotation_rate, self.velocity, highest, rate)
         if self.restoring is not None:
-            angle_rate += self.restoring
-        return np.concatenate([angle_rate.ravel(), self.velocity.sum(axis=2).ravel() / points])
+            rate[: self.restoring.size] += self.restoring.ravel()
+        return rate
+
+
+@compiled
+def _write_rate(curvature: Array, rotation_rate: Array, velocity: Array, held: Array, rate: Array) -> None:
+    """Write the rate of change of the state, without what restores areas and closures.
+
+    The two highest modes of the tangent angle stay as they are: their tangents alias onto a mode whose
+    derivative vanishes, so that bending does not damp them, and the tangential velocity of the points would
+    slowly fill them.
+    """
+    count, points = rotation_rate.shape
+    for vesicle in range(count):
+        own = rate[vesicle * points : (vesicle + 1) * points]
+        for j in range(points):
+            own[j] = rotation_rate[vesicle, j]
+        add_tangential_motion(curvature[vesicle], own, held)
+        for component in range(2):
+            rate[count * (points + component) + vesicle] = velocity[component, vesicle].mean()
 
 
 _FIELDS = ("velocity", "rotation_rate", "tension", "bending", "adhesion", "restoring")

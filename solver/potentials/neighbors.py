@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.compilation import compiled
+from solver.membrane.products import multiply_both
 from solver.membrane.spectral import interpolation, interpolations
 from solver.potentials.refinement import MAXIMUM_FACTOR, Refinement, group_targets
 from solver.potentials.stokeslets import distances, pair_distances
@@ -148,15 +149,19 @@ def gap(geometry: Geometry, refinement: int = 4) -> float:
 def _gap_to_image(geometry: Geometry, refinement: int) -> float:
     """Compute `gap` of a vesicle and its image."""
     membranes = geometry.membranes
-    spacing = membranes.curve_spacing
-    apart = pair_distances(geometry.curve_points, geometry.curve_tangents, spacing, 1)[0, 1]
+    apart = np.empty((1, 2, membranes.points))
+    nearest = pair_distances(geometry.curve_points, geometry.curve_tangents, membranes.curve_spacing, apart)
     # Points that are interpolated are at most half a spacing from one that is not.
-    near = np.repeat(apart <= apart.min() + spacing[0], refinement)
-    matrix = interpolation(membranes.points, refinement).T
-    points, tangents = geometry.points[:, 0] @ matrix, geometry.tangents[:, 0] @ matrix
-    targets = np.ascontiguousarray(points[:, np.roll(near, -(refinement // 2))])
+    near = np.repeat(apart[0, 1] <= nearest + 1, refinement)
+    matrix = interpolation(membranes.points, refinement)
+    fine = np.empty((4, len(matrix)))
+    multiply_both(matrix, *geometry.points[:, 0], fine[0], fine[1])
+    multiply_both(matrix, *geometry.tangents[:, 0], fine[2], fine[3])
+    shifted = np.concatenate([near[refinement // 2 :], near[: refinement // 2]])
+    targets = np.ascontiguousarray(fine[:2, shifted])
     gaps = np.empty(targets.shape[1])
-    distances(targets, -points, -tangents, spacing[0] / refinement, gaps)
+    np.negative(fine, out=fine)
+    distances(targets, fine[:2], fine[2:], membranes.spacing[0] / refinement, gaps)
     return float(gaps.min())
 
 

@@ -85,12 +85,10 @@ class Closeness:
     def __init__(self, geometry: Geometry) -> None:
         membranes = geometry.membranes
         self._points = membranes.points
-        spacing = membranes.curve_spacing
-        self.distances = pair_distances(
-            geometry.curve_points, geometry.curve_tangents, spacing, membranes.count
+        self.distances = np.empty((membranes.count, membranes.curves, membranes.points))
+        self.nearest: float = pair_distances(
+            geometry.curve_points, geometry.curve_tangents, membranes.curve_spacing, self.distances
         )
-        self.distances /= spacing[:, None]
-        self.nearest = float(self.distances.min())
 
     def refinement(self, ratio: float, limits: Array | None = None) -> Refinement:
         """Return the refinement, see `Proximity`.

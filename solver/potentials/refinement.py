@@ -63,14 +63,44 @@ def refinement_factors(distance_per_spacing: Array, ratio: float) -> Indices:
     -------
     (n,)
     """
-    factors = np.ones(distance_per_spacing.size, dtype=np.int64)
+    factors = np.empty(distance_per_spacing.size, dtype=np.int64)
     for i in range(factors.size):
+        factors[i] = 1
         while factors[i] < MAXIMUM_FACTOR and factors[i] * distance_per_spacing[i] < ratio:
             factors[i] *= 2
     return factors
 
 
 @compiled
+def _group_targets(
+    pairs: Indices,
+    distances: Array,
+    ratio: float,
+    limits: Array,
+    groups: Indices,
+    rows: Indices,
+    starts: Indices,
+) -> int:
+    """Write the arrays of `group_targets`, and return the number of groups."""
+    found = used = 0
+    starts[0] = 0
+    for pair in range(pairs.shape[0]):
+        source = pairs[pair, 1]
+        factors = refinement_factors(distances[pair], ratio)
+        factor = 1
+        while factor <= MAXIMUM_FACTOR:
+            for i in range(factors.size):
+                if factors[i] == factor and distances[pair, i] < limits[source]:
+                    rows[used] = i
+                    used += 1
+            if used > starts[found]:
+                groups[found, 0], groups[found, 1], groups[found, 2] = pairs[pair, 0], source, factor
+                found += 1
+                starts[found] = used
+            factor *= 2
+    return found
+
+
 def group_targets(
     pairs: Indices, distances: Array, ratio: float, limits: Array
 ) -> tuple[Indices, Indices, Indices]:
@@ -93,29 +123,11 @@ def group_targets(
     rows : (·,)
     starts : (·,)
     """
-    groups = [(0, 0, 0)][:0]
+    most = len(pairs) * MAXIMUM_FACTOR.bit_length()
+    groups, starts = np.empty((most, 3), dtype=np.int64), np.empty(most + 1, dtype=np.int64)
     rows = np.empty(distances.size, dtype=np.int64)
-    starts = [0]
-    used = 0
-    for pair in range(pairs.shape[0]):
-        target, source = pairs[pair]
-        factors = refinement_factors(distances[pair], ratio)
-        for i in range(factors.size):
-            if distances[pair, i] >= limits[source]:
-                factors[i] = 0
-        factor = 1
-        while factor <= factors.max():
-            members = np.flatnonzero(factors == factor)
-            if members.size > 0:
-                rows[used : used + members.size] = members
-                used += members.size
-                groups.append((target, source, factor))
-                starts.append(used)
-            factor *= 2
-    table = np.empty((len(groups), 3), dtype=np.int64)
-    for g in range(len(groups)):
-        table[g, 0], table[g, 1], table[g, 2] = groups[g]
-    return table, rows[:used], np.array(starts)
+    found = _group_targets(pairs, distances, ratio, limits, groups, rows, starts)
+    return groups[:found], rows[: starts[found]], starts[: found + 1]
 
 
 def within(refinement: Refinement, own: slice, size: int) -> Refinement:

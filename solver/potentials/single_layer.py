@@ -175,10 +175,5 @@ class SingleLayer:
             geometry.curve_points.reshape(2, -1), curve_forces, by_points, own.start
         )
         by_state = shares.gather(geometry.by_state(by_points), axis=1)
-        forces = point_forces.reshape(2, -1)
-        # On the diagonal r⊗r/r² is t⊗t, which rotates with the tangent.
-        tangents, normals = geometry.tangents.reshape(2, -1), geometry.normals.reshape(2, -1)
-        along, across = np.sum(tangents * forces, axis=0), np.sum(normals * forces, axis=0)
-        every_point = np.arange(size)
-        by_state[:, every_point, every_point] += (normals * along + tangents * across) / (4 * np.pi)
+        stokeslets.add_tangent_rotation(geometry.tangents, point_forces, by_state)
         return by_state

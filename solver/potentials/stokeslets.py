@@ -67,10 +67,15 @@ def complete_self_parts(
         point = begin + row
         vesicle, i = point // n, point % n
         first = vesicle * n
+        # As rows: indexed in three dimensions the loop is not turned into SIMD code.
+        xx, yy, missing = (
+            components[0, row, first : first + n],
+            components[2, row, first : first + n],
+            correction[i],
+        )
         for j in range(n):
-            components[0, row, first + j] += correction[i, j]
-        for j in range(n):
-            components[2, row, first + j] += correction[i, j]
+            xx[j] += missing[j]
+            yy[j] += missing[j]
         tx, ty = tangents[0, vesicle, i], tangents[1, vesicle, i]
         components[0, row, point] = diagonal[vesicle] + scale * tx * tx
         components[1, row, point] = scale * tx * ty
@@ -94,10 +99,14 @@ def join_components(components: Array, matrix: Array) -> None:
     for block, component in ((0, 0), (1, 1), (2, 1), (3, 2)):
         row, column = block // 2 * m, block % 2 * m
         for i in range(m):
-            for j in range(m):
-                matrix[row + i, column + j] = components[component, i, j]
-            for image in range(m, components.shape[2]):
-                matrix[row + i, column + image - m] -= components[component, i, image]
+            joined, own = matrix[row + i, column : column + m], components[component, i, :m]
+            if components.shape[2] == m:
+                for j in range(m):
+                    joined[j] = own[j]
+            else:
+                image = components[component, i, m:]
+                for j in range(m):
+                    joined[j] = own[j] - image[j]
 
 
 @compiled
@@ -157,6 +166,29 @@ def stokeslet_derivatives(points: Array, forces: Array, by_points: Array, first:
 
 
 @compiled
+def add_tangent_rotation(tangents: Array, forces: Array, by_state: Array) -> None:
+    """Add what rotating tangents change where a point is its own source: there r⊗r/r² is t⊗t.
+
+    Parameters
+    ----------
+    tangents, forces : (2, M, n)
+        At the points; the forces are point forces.
+    by_state : (2, M·n, state_size)
+        Derivatives of velocities by the tangent angles, which come first.  Changed in place.
+    """
+    scale = 1.0 / (4.0 * np.pi)
+    _, count, n = tangents.shape
+    for vesicle in range(count):
+        for j in range(n):
+            tx, ty = tangents[0, vesicle, j], tangents[1, vesicle, j]
+            along = scale * (tx * forces[0, vesicle, j] + ty * forces[1, vesicle, j])
+            across = scale * (tx * forces[1, vesicle, j] - ty * forces[0, vesicle, j])
+            point = vesicle * n + j
+            by_state[0, point, point] += tx * across - ty * along
+            by_state[1, point, point] += tx * along + ty * across
+
+
+@compiled
 def distances(targets: Array, sources: Array, tangents: Array, spacing: float, out: Array) -> None:
     """Write the distance of every target to a curve, to the second order in its spacing.
 
@@ -172,21 +204,20 @@ def distances(targets: Array, sources: Array, tangents: Array, spacing: float, o
     out : (m,)
         Written to.
     """
+    source_x, source_y = sources[0], sources[1]
+    squares = np.empty(source_x.size)
     for i in range(targets.shape[1]):
         xi, yi = targets[0, i], targets[1, i]
-        nearest = np.inf
-        for j in range(sources.shape[1]):
-            dx = xi - sources[0, j]
-            dy = yi - sources[1, j]
-            nearest = min(nearest, dx * dx + dy * dy)
-        for j in range(sources.shape[1]):
-            dx = xi - sources[0, j]
-            dy = yi - sources[1, j]
-            if dx * dx + dy * dy <= nearest:
-                along = abs(dx * tangents[0, j] + dy * tangents[1, j])
-                inside = min(along, 0.5 * spacing)
-                out[i] = np.sqrt(max(nearest - along * along, 0.0) + (along - inside) ** 2)
-                break
+        for j in range(squares.size):
+            dx, dy = xi - source_x[j], yi - source_y[j]
+            squares[j] = dx * dx + dy * dy
+        at, nearest = 0, np.inf
+        for j in range(squares.size):
+            if squares[j] < nearest:
+                at, nearest = j, squares[j]
+        along = abs((xi - source_x[at]) * tangents[0, at] + (yi - source_y[at]) * tangents[1, at])
+        inside = min(along, 0.5 * spacing)
+        out[i] = np.sqrt(max(nearest - along * along, 0.0) + (along - inside) ** 2)
 
 
 @compiled
@@ -216,30 +247,30 @@ def waists(points: Array) -> Array:
 
 
 @compiled
-def pair_distances(points: Array, tangents: Array, spacing: Array, count: int) -> Array:
-    """Return the `distances` for all ordered pairs of curves.
+def pair_distances(points: Array, tangents: Array, spacing: Array, out: Array) -> float:
+    """Write the `distances` between curves over the spacing of the source, for all ordered pairs.
 
     Parameters
     ----------
     points, tangents : (2, C, N)
     spacing : (C,)
-    count : int
-        Of the curves, the first so many are targets.
+    out : (count, C, N), written to
+        [a, b, i] is for point i of curve a, one of the first, and curve b; infinite from a curve to itself.
 
     Returns
     -------
-    (count, C, N)
-        [a, b, i] is the distance of point i of curve a to curve b; infinite from a curve to itself.
+    float
+        The smallest.
     """
-    out = np.full((count, points.shape[1], points.shape[2]), np.inf)
-    for target in range(count):
-        for source in range(points.shape[1]):
-            if target != source:
-                distances(
-                    points[:, target],
-                    points[:, source],
-                    tangents[:, source],
-                    spacing[source],
-                    out[target, source],
-                )
-    return out
+    smallest = np.inf
+    for target in range(out.shape[0]):
+        for source in range(out.shape[1]):
+            own = out[target, source]
+            if target == source:
+                own[:] = np.inf
+                continue
+            distances(points[:, target], points[:, source], tangents[:, source], spacing[source], own)
+            for i in range(own.size):
+                own[i] /= spacing[source]
+                smallest = min(smallest, own[i])
+    return smallest
