@@ -111,7 +111,9 @@ def _settings(store: Path) -> Settings:
     from pydantic import ValidationError
 
     from api.settings import Settings
+    from ensemble.config.checkpoint_interval import checkpoint_seconds
 
+    checkpoint_seconds()  # the jobs of a worker take it from its environment
     try:
         return Settings(store=store)
     except ValidationError as error:

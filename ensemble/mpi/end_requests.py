@@ -34,7 +34,7 @@ class EndRequests(AbstractContextManager["EndRequests"]):
         self._rank = 0 if communicator is None else communicator.Get_rank()
         # A signal handler runs in the main thread, which may be the one that holds the lock.
         self._lock = threading.RLock()
-        self._asked = False
+        self._signaled = self._asked = self._leaves = False
         self._sent: Request | None = None
         self._received = 0
 
@@ -45,7 +45,7 @@ class EndRequests(AbstractContextManager["EndRequests"]):
         Returns
         -------
         bool
-            False if it cannot, or has been asked before: then the process has to end at once.
+            False if it cannot, or this process has asked before: then it has to end at once.
         """
         current = cls._current
         return current is not None and current._take()
@@ -63,25 +63,27 @@ class EndRequests(AbstractContextManager["EndRequests"]):
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        """Take none any more, and receive the messages that are on their way."""
+        """Pass no request on any more, wait for all ranks, and receive what is on its way."""
         with self._lock:
-            EndRequests._current = None
-            self._asked = True
-        if self._communicator is None or (kind is not None and not issubclass(kind, Interrupted)):
-            return
-        sent: int = self._communicator.reduce(int(self._sent is not None)) or 0
-        while self._rank == 0 and self._received < sent:
-            self._receive()
-        if self._sent is not None:
-            self._sent.wait()
+            self._leaves = True
+        if self._communicator is not None and (kind is None or issubclass(kind, Interrupted)):
+            sent: int = self._communicator.allreduce(int(self._sent is not None))
+            while self._rank == 0 and self._received < sent:
+                self._receive()
+            if self._sent is not None:
+                self._sent.wait()
+        EndRequests._current = None
 
     def _take(self) -> bool:
         with self._lock:
-            if self._asked:
+            # A launcher signals all ranks: the message of another one may have come before.
+            if self._signaled:
                 return False
+            self._signaled = True
+            if self._leaves:  # the work is done, or suspended already
+                return True
             if self._communicator is not None and self._rank > 0:
                 self._sent = self._communicator.isend(None, dest=0, tag=_REQUESTS)
-                self._asked = True
             else:
                 self._note()
             return True
@@ -96,6 +98,6 @@ class EndRequests(AbstractContextManager["EndRequests"]):
 
     def _note(self) -> None:
         """Note on the first rank that the job is asked to end, and say so once."""
-        if not self._asked:
+        if not self._asked and not self._leaves:
             self._asked = True
             tell("ends after the next step of its runs; the same command goes on (a second signal: at once)")
