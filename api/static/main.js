@@ -7,6 +7,7 @@ import { startTheme } from "./theme.js";
 import { showBoundaries } from "./views/boundaries.js";
 import { showJob } from "./views/job.js";
 import { showJobs } from "./views/jobs.js";
+import { showReport, showReports } from "./views/reports.js";
 import { showRun } from "./views/run.js";
 import { showRuns } from "./views/runs.js";
 import { showSubmission } from "./views/submission.js";
@@ -30,5 +31,7 @@ startRouter([
   { path: /^\/runs\/(?<key>[0-9a-f]{32})$/, section: "runs", show: after(showRun, loadFlows) },
   { path: /^\/jobs$/, section: "jobs", show: after(showJobs, loadKinds) },
   { path: /^\/jobs\/(?<id>[0-9a-z-]+)$/, section: "jobs", show: after(showJob, loadFlows, loadKinds) },
+  { path: /^\/reports$/, section: "reports", show: showReports },
+  { path: /^\/reports\/(?<name>work-precision|stability|scaling|paper)$/, section: "reports", show: showReport },
   { path: /^\/new$/, section: "new", show: after(showSubmission, loadFlows, loadKinds) },
 ]);

@@ -17,6 +17,7 @@ export const MARKS = {
   equilibrium: { color: "equilibrium", symbol: "triangle-up", glyph: "▲" },
   steady: { color: "steady", symbol: "triangle-down", glyph: "▼" },
   tumbling: { color: "muted", symbol: "cross", glyph: "✚" },
+  completed: { color: "completed", symbol: "hexagon-open", glyph: "⬡" },
   undecided: { color: "undecided", symbol: "diamond-open", glyph: "◇" },
   failed: { color: "ink", symbol: "cross-thin-open", glyph: "+" },
 };

@@ -13,7 +13,7 @@ from ensemble.cli.printing import print_json
 from ensemble.config.defaults import DEFAULT_STORE
 from ensemble.errors import BadInput, refusing
 from ensemble.mpi.world import launched_rank
-from ensemble.report import ReportName
+from ensemble.report import PAGE, ReportName
 
 if TYPE_CHECKING:
     from ensemble.report.report_files import FinishedReport
@@ -50,7 +50,7 @@ def report(  # numpydoc ignore=PR01
     if as_json:
         print_json(made.document.model_dump(mode="json"))
     else:
-        print("\n".join([*made.conclusions, f"The whole report: {made.directory / 'report.md'}"]))
+        print("\n".join([*made.conclusions, f"The whole report: {made.directory / PAGE}"]))
 
 
 def _paper(only: list[str], quick: bool, store: Path, ranks_per_run: str | None) -> FinishedReport | None:

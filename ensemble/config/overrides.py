@@ -7,6 +7,7 @@ vesicles of an arrangement can be changed in the same way as listed ones.
 from __future__ import annotations
 
 import copy
+import json
 import re
 import tomllib
 from collections.abc import Mapping
@@ -14,13 +15,16 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from ensemble.config.dotted_paths import is_array, locations
+from ensemble.config.dotted_paths import is_array, locations, value_at
 from ensemble.config.validation import validated
 from solver.dimensions import is_quantity
 from solver.scene import Arrangement
 
 # Of two fields either one is given: to set one takes the other out.
 _EITHER = {"hamaker": "adhesion_energy", "adhesion_energy": "hamaker"}
+
+LONGEST_NAME = 100  # characters of the name of a document
+
 _BARE_WORD = re.compile(r"[A-Za-z_][\w.-]*")
 
 
@@ -63,7 +67,8 @@ def override(document: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[st
     """Return a copy of a document with the values at some dotted paths replaced.
 
     Tables that do not exist yet are added.  Whether the document may contain them is decided later, when its
-    model validates it.
+    model validates it.  A document that has a name is then called after it and the changes, so that no two
+    share a name that differ.
 
     Parameters
     ----------
@@ -94,7 +99,28 @@ def override(document: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[st
             node[last] = copy.deepcopy(value)
             if last in _EITHER and isinstance(node, dict):
                 node.pop(_EITHER[last], None)
+    if isinstance(document.get("name"), str) and "name" not in changes:
+        changed["name"] = _name_with_changes(document, changes)
     return changed
+
+
+def _name_with_changes(document: Mapping[str, Any], changes: Mapping[str, Any]) -> str:
+    made = (
+        f"{path}={json.dumps(value, default=str)}"
+        for path, value in changes.items()
+        if not _has(document, path, value)
+    )
+    name = ", ".join((document["name"], *made))
+    return name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 1]}…"
+
+
+def _has(document: Mapping[str, Any], path: str, value: Any) -> bool:
+    """Return whether a document has this value wherever a dotted path leads."""
+    try:
+        places = locations(document, path)
+    except ValueError:
+        return False
+    return bool(places) and all(value_at(document, place) == value for place in places)
 
 
 def _list_vesicles(document: dict[str, Any], path: str) -> None:

@@ -25,7 +25,7 @@ from ensemble.config.certifying_scene import certifying_scene
 from ensemble.config.dotted_paths import locations, value_at
 from ensemble.config.geometric_grid import GeometricGrid
 from ensemble.config.measured import dimension_at
-from ensemble.config.overrides import override
+from ensemble.config.overrides import LONGEST_NAME, override
 from ensemble.config.validation import validated
 from solver.analysis.run import Outcome
 from solver.dimensions import Dimension, or_quantity
@@ -210,7 +210,7 @@ class Study(Model):
     """
 
     # Without control characters: it is shown on terminals and in pages.
-    name: Annotated[str, Field(min_length=1, max_length=100, pattern=r"^[^\x00-\x1f\x7f-\x9f]+$")]
+    name: Annotated[str, Field(min_length=1, max_length=LONGEST_NAME, pattern=r"^[^\x00-\x1f\x7f-\x9f]+$")]
     scene: Scene
     sweep: Sweep
     search: Search

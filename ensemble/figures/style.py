@@ -60,6 +60,7 @@ VERMILLION: Final = "#D55E00"
 GREEN: Final = "#009E73"
 ORANGE: Final = "#E69F00"
 SKY: Final = "#56B4E9"
+YELLOW: Final = "#F0E442"
 PURPLE: Final = "#CC79A7"
 BLACK: Final = "#000000"
 GRAY: Final = "#8C8C8C"
@@ -130,6 +131,7 @@ MARKS: Final[dict[Outcome, Mark]] = {
     Outcome.EQUILIBRIUM: Mark.filled(SKY, "^"),
     Outcome.STEADY: Mark.filled(PURPLE, "v"),
     Outcome.TUMBLING: Mark.filled(GRAY, "P"),
+    Outcome.COMPLETED: Mark(YELLOW, "h", face=YELLOW, edge=BLACK, edge_width=0.5),
     Outcome.UNDECIDED: Mark.hollow(ORANGE, "D"),
     Outcome.FAILED: Mark.hollow(BLACK, "+"),
 }

@@ -146,7 +146,7 @@ def checkpointed_run(
 
     def after_step(simulation: Simulation) -> None:
         if on_progress and not simulation.relaxes:
-            on_progress(simulation.time, scene.latest_time)
+            on_progress(simulation.time, scene.horizon)
         if simulation.done:
             return
         order = parallel.agree(keeper.order() if keeper else Order.GO_ON)

@@ -75,7 +75,7 @@ def total_cost(planned_runs: Iterable[tuple[Scene, int]]) -> Cost:
 
 
 def run_work(scene: Scene) -> float:
-    """Return the work of a run that goes on to the end of its extended horizon.
+    """Return the work of a run that goes on to the horizon.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def run_work(scene: Scene) -> float:
     float
         Points × vesicles × time; more with a viscosity contrast.
     """
-    time = scene.horizon * scene.criteria.extensions
+    time = scene.horizon
     if scene.start.relaxed:
         time += scene.start.horizon
     if _has_contrast(scene):
@@ -96,7 +96,7 @@ def run_work(scene: Scene) -> float:
 
 
 def recorded_numbers(scene: Scene) -> float:
-    """Return how many numbers a run records that goes on to the end of its extended horizon.
+    """Return how many numbers a run records that goes on to the horizon.
 
     Parameters
     ----------
@@ -108,9 +108,9 @@ def recorded_numbers(scene: Scene) -> float:
     float
         Diagnostics of every record, and positions and tensions of every recorded state.
     """
-    time, vesicles, output = scene.horizon * scene.criteria.extensions, len(scene.vesicles), scene.output
-    records = time / output.interval + _ENDS
-    frames = min(time / output.frame_interval + _ENDS, records)
+    vesicles, output = len(scene.vesicles), scene.output
+    records = scene.horizon / output.interval + _ENDS
+    frames = min(scene.horizon / output.frame_interval + _ENDS, records)
     return records * (_SERIES + _VESICLE_SERIES * vesicles) + frames * (1 + 2 * (_points(scene) + vesicles))
 
 
@@ -144,7 +144,7 @@ def _points(scene: Scene) -> int:
 
 
 def _limit_output(scene: Scene) -> None:
-    time = scene.horizon * scene.criteria.extensions
+    time = scene.horizon
     least = {"interval": time / MOST_RECORDS, "frame_interval": time * _points(scene) / MOST_RECORDED_POINTS}
     for name, limit in least.items():
         interval = getattr(scene.output, name)

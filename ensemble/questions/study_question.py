@@ -182,7 +182,7 @@ class StudyQuestion(Question[Study]):
         store : Store
             An open store.
         name : str
-            Key of the study, as much of it as no other key begins with, or the name of the study.
+            The name of the study, its key, or the beginning of one of them that no other has.
 
         Returns
         -------
@@ -196,7 +196,9 @@ class StudyQuestion(Question[Study]):
         """
         named = store.boundaries_named(name)
         if len(named) > 1:
-            keys = ", ".join(f"{each.study_key} of {each.updated:%Y-%m-%d %H:%M:%S}" for each in named)
+            keys = "; ".join(
+                f"{each.study_key} of {each.updated:%Y-%m-%d %H:%M:%S}, {each.name}" for each in named
+            )
             raise ValueError(f"{name!r} — {len(named)} boundaries; name one by its key: {keys}")
         return _StoredBoundary(named[0], store) if named else None
 

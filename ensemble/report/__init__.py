@@ -4,6 +4,11 @@ The runs behind a report are kept in the store like any other, so a report that 
 """
 
 from enum import StrEnum
+from pathlib import Path
+from typing import Final
+
+PAGE: Final = "report.html"
+_REPORTS = "reports"  # directory in a store
 
 
 class ReportName(StrEnum):
@@ -13,3 +18,21 @@ class ReportName(StrEnum):
     STABILITY = "stability"
     SCALING = "scaling"
     PAPER = "paper"
+
+
+def report_directory(store: Path, name: ReportName) -> Path:
+    """Return the directory that holds the files of a report.
+
+    Parameters
+    ----------
+    store : Path
+        Directory of the store that keeps the report.
+    name : ReportName
+        Name of the report.
+
+    Returns
+    -------
+    Path
+        It may not exist yet.
+    """
+    return store / _REPORTS / name

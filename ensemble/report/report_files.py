@@ -10,11 +10,9 @@ from matplotlib.figure import Figure
 
 from ensemble.disk import replacing
 from ensemble.figures import save
-from ensemble.report import ReportName
+from ensemble.report import PAGE
 from ensemble.report.report_model import ReportModel
-from ensemble.store import Store
-
-_REPORTS = "reports"  # directory in the store
+from ensemble.report.report_page import report_page
 
 
 @dataclass(frozen=True)
@@ -39,44 +37,23 @@ class FinishedReport:
     conclusions: Sequence[str]
 
 
-def report_directory(store: Store, name: ReportName) -> Path:
-    """Return the directory that holds the files of a report.
-
-    Parameters
-    ----------
-    store : Store
-        The store that keeps the report.
-    name : ReportName
-        Name of the report.
-
-    Returns
-    -------
-    Path
-        ``reports/<name>`` in the store; it may not exist yet.
-    """
-    return store.path / _REPORTS / name
-
-
-def write_report(
-    report: FinishedReport, figures: Mapping[str, Figure], pages: Mapping[str, str] | None = None
-) -> None:
+def write_report(report: FinishedReport, figures: Mapping[str, Figure]) -> None:
     """Write the files of a report; each appears complete or not at all.
 
     Parameters
     ----------
     report : FinishedReport
-        Its text becomes ``report.md``, its document ``report.json``.
+        Its text becomes ``report.md`` and ``report.html``, its document ``report.json``.
     figures : mapping of str to Figure
         Figures by name; each becomes ``<name>.png`` and ``<name>.svg``.
-    pages : mapping of str to str, optional
-        Further texts by file name.
     """
     report.directory.mkdir(parents=True, exist_ok=True)
     for name, figure in figures.items():
         for suffix in (".png", ".svg"):
             save(figure, report.directory / f"{name}{suffix}")
     data = report.document.model_dump_json(indent=2)
-    texts = {"report.json": data, "report.md": report.text} | dict(pages or {})
+    page = report_page(report.text, report.directory)
+    texts = {"report.json": data, "report.md": report.text, PAGE: page}
     for name, content in texts.items():
         with replacing(report.directory / name) as unfinished:
             unfinished.write_text(content, encoding="utf-8")

@@ -95,4 +95,4 @@ def expected_work(scene: Scene) -> float:
     """
     points = _AUTOMATIC_POINTS if scene.numerics.points == "auto" else scene.numerics.points
     relaxation = scene.start.horizon if scene.start.relaxed else 0.0
-    return (relaxation + scene.latest_time) * (len(scene.vesicles) * points) ** 2
+    return (relaxation + scene.horizon) * (len(scene.vesicles) * points) ** 2

@@ -10,6 +10,7 @@ from ensemble.search.boundary import Boundary
 from ensemble.search.critical_value import SearchStatus
 
 FEWEST_POINTS = 3  # two points lie on a line whatever the physics
+LARGEST_RESIDUAL = 0.02  # of the range of the critical values; beyond, points lie visibly off the line
 
 
 class Line(BaseModel):
@@ -38,7 +39,8 @@ def line_through(boundary: Boundary) -> Line | None:
     Returns
     -------
     Line or None
-        None if fewer than three points have converged.
+        None if fewer than three points have converged, or one of them lies off the line by more than 2 % of
+        the difference between the largest and the smallest critical value.
     """
     swept = boundary.study["sweep"]["parameter"]
     points = [
@@ -49,5 +51,8 @@ def line_through(boundary: Boundary) -> Line | None:
     if len(points) < FEWEST_POINTS:
         return None
     parameters, critical = np.array(points).T
-    intercept, slope = Polynomial.fit(parameters, critical, deg=1).convert().coef
+    fit = Polynomial.fit(parameters, critical, deg=1)
+    if np.abs(fit(parameters) - critical).max() > LARGEST_RESIDUAL * np.ptp(critical):
+        return None
+    intercept, slope = fit.convert().coef
     return Line(intercept=float(intercept), slope=float(slope))

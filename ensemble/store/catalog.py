@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from sqlalchemy import Executable, Select, Text, bindparam, cast, delete, func, insert, select, tuple_
+from sqlalchemy import Executable, Select, Text, bindparam, cast, delete, func, insert, or_, select, tuple_
 from sqlalchemy.exc import DatabaseError
 from sqlalchemy.orm import InstrumentedAttribute
 from sqlalchemy.schema import CreateSchema
@@ -239,12 +239,12 @@ class Catalog:
         return self._one(_ONE_BOUNDARY, study_key)
 
     def boundaries_named(self, name: str) -> list[Record]:
-        """Return the boundaries of a name, or else those whose key begins with it; the latest change last.
+        """Return the boundaries of a name, or else those whose name or key begins so; the latest change last.
 
         Parameters
         ----------
         name : str
-            Name of the study, or the first characters of its key.
+            Name of the study, its key, or the first characters of one of them.
 
         Returns
         -------
@@ -252,7 +252,10 @@ class Catalog:
         """
         by_change = _BOUNDARY.order_by(BoundaryRow.updated, BoundaryRow.study_key)
         has_name = BoundaryRow.document["name"].as_string() == name
-        begins_so = BoundaryRow.study_key.startswith(name, autoescape=True)
+        begins_so = or_(
+            BoundaryRow.study_key.startswith(name, autoescape=True),
+            BoundaryRow.document["name"].as_string().startswith(name, autoescape=True),
+        )
         return self._all(by_change.where(has_name)) or self._all(by_change.where(begins_so))
 
     def boundaries(self, listing: Listing) -> Iterator[Record]:

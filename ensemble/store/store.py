@@ -568,12 +568,12 @@ class Store(AbstractContextManager["Store"]):
         return list(readable(Boundary, "boundary", self._catalog.boundaries(listing)))
 
     def boundaries_named(self, name: str) -> list[Boundary]:
-        """Return the boundaries of a name, or else those whose key begins with it; the latest change last.
+        """Return the boundaries of a name, or else those whose name or key begins so; the latest change last.
 
         Parameters
         ----------
         name : str
-            Name of the study, or the first characters of its key.
+            Name of the study, its key, or the first characters of one of them.
 
         Returns
         -------

@@ -28,6 +28,7 @@ class Outcome(StrEnum):
     EQUILIBRIUM = "equilibrium"
     STEADY = "steady"
     TUMBLING = "tumbling"
+    COMPLETED = "completed"
     UNDECIDED = "undecided"
     FAILED = "failed"
 

@@ -49,8 +49,6 @@ class ImposedFlow(Model, ABC):
     strains : bool
         Whether a pair comes to rest in the flow, side by side or end to end, with an inclination to the
         diverging axis y.
-    extends_pairs : bool
-        Whether a pair that is undecided at the horizon runs on (`Criteria.extensions`).
     """
 
     kind: str
@@ -61,7 +59,6 @@ class ImposedFlow(Model, ABC):
     odd: ClassVar[bool] = False
     rotates: ClassVar[bool] = False
     strains: ClassVar[bool] = False
-    extends_pairs: ClassVar[bool] = False
 
     @abstractmethod
     def velocity(self, points: Array, centers: Array) -> Array:

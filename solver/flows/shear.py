@@ -19,7 +19,6 @@ class Shear(LinearFlow):
     title: ClassVar[str] = "shear flow"
     symbols: ClassVar[Mapping[str, Symbol]] = {"rate": Symbol("shear rate", r"\dot{\gamma}", "γ̇")}
     rotates: ClassVar[bool] = True
-    extends_pairs: ClassVar[bool] = True
     unit_gradient: ClassVar[Array] = np.array([[0.0, 1.0], [0.0, 0.0]])
 
     @property

@@ -22,7 +22,6 @@ class Trap(LinearFlow):
     title: ClassVar[str] = "a fluid trap"
     symbols: ClassVar[Mapping[str, Symbol]] = {"rate": Symbol("extension rate", r"\dot{\epsilon}", "ε̇")}
     strains: ClassVar[bool] = True
-    extends_pairs: ClassVar[bool] = True
     unit_gradient: ClassVar[Array] = np.array([[-1.0, 0.0], [0.0, 1.0]])
 
     def velocity(self, points: Array, centers: Array) -> Array:

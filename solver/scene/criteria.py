@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from solver.dimensions import LENGTH, RATE, TIME
 from solver.model import Model, Positive
 
-_FORMER = ("gap_growth",)
+_FORMER = ("gap_growth", "extensions")
 
 
 class Criteria(Model):
@@ -31,8 +31,6 @@ class Criteria(Model):
         A state is steady if no tangent angle and no center changes faster.
     steady_time : float
         For at least this long.
-    extensions : float
-        Multiple of the horizon up to which an undecided pair runs on, in a flow where it may.
     """
 
     separated_distance: Annotated[Positive, LENGTH] = 12.0
@@ -40,7 +38,6 @@ class Criteria(Model):
     settled_change: Positive = 0.01
     steady_rate: Annotated[Positive, RATE] = 1e-5
     steady_time: Annotated[Positive, TIME] = 5.0
-    extensions: float = Field(4.0, ge=1)
 
     @model_validator(mode="before")
     @classmethod

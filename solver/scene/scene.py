@@ -38,7 +38,7 @@ class Scene(Model):
     units : Units or None
         What the units are, for numbers that are given or shown with a unit.  No result depends on them.
     horizon : float
-        Time at which a run ends that is not decided before.
+        Time at which a run ends that is not decided before.  A run that is decided ends at once.
     arrangement : Arrangement or None
         May be given instead of the vesicles.  Validation turns it into these; in a validated scene it is
         None.
@@ -120,10 +120,10 @@ class Scene(Model):
     @model_validator(mode="after")
     def _records_that_can_be_held(self) -> Self:
         for name, interval in self.output:
-            if self.latest_time > MOST_RECORDS * interval:
+            if self.horizon > MOST_RECORDS * interval:
                 raise ValueError(
-                    f"output.{name} must be at least {self.latest_time / MOST_RECORDS:g}, a millionth of the "
-                    f"time that the run may last, got {interval:g}"
+                    f"output.{name} must be at least {self.horizon / MOST_RECORDS:g}, a millionth of the "
+                    f"horizon, got {interval:g}"
                 )
         return self
 
@@ -131,13 +131,6 @@ class Scene(Model):
     def imposed_flow(self) -> ImposedFlow | None:
         """The flow, None in a quiescent fluid: one without, or with a flow of rate 0."""
         return self.flow if self.flow and self.flow.rate > 0 else None
-
-    @property
-    def latest_time(self) -> float:
-        """When a run ends at the latest; an undecided pair may run on beyond the horizon."""
-        flow = self.imposed_flow
-        extended = len(self.vesicles) == 2 and flow is not None and flow.extends_pairs
-        return self.horizon * (self.criteria.extensions if extended else 1.0)
 
     @model_validator(mode="after")
     def _options_of_many(self) -> Self:

@@ -82,8 +82,7 @@ class MovingFrame(Remembering):
             vesicle.model_copy(update={"center": tuple(offset.tolist())})
             for vesicle, offset in zip(scene.vesicles, offsets, strict=True)
         )
-        criteria = scene.criteria.model_copy(update={"extensions": scene.latest_time / scene.horizon})
-        within = scene.model_copy(update={"flow": flow.comoving, "vesicles": vesicles, "criteria": criteria})
+        within = scene.model_copy(update={"flow": flow.comoving, "vesicles": vesicles})
         # A relaxed pair begins at the origin.
         return cls(flow, within, np.zeros(2) if scene.start.relaxed else mean)
 

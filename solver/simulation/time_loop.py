@@ -176,7 +176,7 @@ class TimeLoop(Remembering):
     @property
     def done(self) -> bool:
         """Whether the run is decided or has come to its latest time."""
-        return self.time >= self._scene.latest_time or self.outcome is not Outcome.UNDECIDED
+        return self.time >= self._scene.horizon or self.outcome is not Outcome.UNDECIDED
 
     @property
     def settled(self) -> bool:
@@ -187,7 +187,7 @@ class TimeLoop(Remembering):
         """Prepare the first step."""
         for criterion in self._criteria:
             criterion.begin(self._history)
-        self.segment.begin(self.time, self.state, self._scene.latest_time, self.error)
+        self.segment.begin(self.time, self.state, self._scene.horizon, self.error)
 
     def advance(self) -> bool:
         """Take one step.
@@ -254,7 +254,7 @@ class TimeLoop(Remembering):
 
     def _accept(self, step: Step) -> None:
         # The last step is as long as what is left of the run.
-        if step.end < self._scene.latest_time or self.smallest_step is None:
+        if step.end < self._scene.horizon or self.smallest_step is None:
             duration = float(step.end - step.start)
             self.smallest_step = min(self.smallest_step or duration, duration)
         if self.tracker:

@@ -24,7 +24,7 @@ from tests.scan_kind import Scan, ScanQuestion
 ROOT = Path(__file__).parents[2]
 SCENE = load_scene(
     "vesicle-shear",
-    ["numerics.points=32", "numerics.tolerance=1e-2", "horizon=1.0", "criteria.extensions=1.0"],
+    ["numerics.points=32", "numerics.tolerance=1e-2", "horizon=1.0"],
 )
 SCAN = Scan(scene=SCENE, parameter="flow.rate", values=(0.5, 0.75))
 OUTCOMES = {"0.5": "undecided", "0.75": "undecided"}

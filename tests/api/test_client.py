@@ -25,7 +25,7 @@ from tests.api.servers import make_token, serving
 from tests.api.services import service, start_service
 from tests.api.stores import FRAMES, RATES, SWEEP, critical, example_boundary
 
-SHORT = {"horizon": 4.0, "criteria.extensions": 1.0}  # a fraction of a second to simulate
+SHORT = {"horizon": 4.0}  # a fraction of a second to simulate
 
 
 @pytest.fixture(scope="module")

@@ -18,6 +18,8 @@ from playwright.sync_api import Browser, ConsoleMessage, Page, Response, expect,
 from api.auth import TokenScope
 from ensemble.config.documents import load_scene, load_study, preset_document, preset_names
 from ensemble.config.run_key import run_key
+from ensemble.report import PAGE, ReportName, report_directory
+from ensemble.report.report_page import report_page
 from ensemble.search.boundary import Boundary
 from ensemble.store import Store
 from solver.analysis.run import Outcome, Run
@@ -85,7 +87,7 @@ def run_path(run: Run) -> str:
 
 @pytest.fixture(scope="module")
 def job_path(url: str) -> str:
-    job = httpx2.post(f"{url}/jobs", json={"preset": "doublet-shear", "set": {"horizon": 0.1}}).json()
+    job = httpx2.post(f"{url}/jobs", json={"preset": "doublet-shear", "set": {"horizon": 0.4}}).json()
     return f"/#/jobs/{job['id']}"
 
 
@@ -354,9 +356,23 @@ def test_every_preset_and_every_stored_scene_can_be_submitted_as_it_is(
         expect(page.get_by_role("button", name="Submit")).to_be_enabled()
 
 
+def test_a_report_is_shown_with_its_contents(page: Page, url: str, store: Path) -> None:
+    page.goto(f"{url}/#/reports")
+    expect(page.locator("main")).to_contain_text("Not made yet: ensemble report work-precision")
+    directory = report_directory(store, ReportName.STABILITY)
+    directory.mkdir(parents=True)
+    text = "# Made up\n\n- It holds.\n\n" + "".join(f"## Part {i}\n\n{'text ' * 2000}\n\n" for i in (1, 2))
+    (directory / PAGE).write_text(report_page(text, directory), encoding="utf-8")
+    page.reload()
+    page.get_by_role("link", name="symmetry of bound pairs").click()
+    report = page.frame_locator("iframe")
+    report.get_by_role("link", name="Part 2").click()
+    expect(report.get_by_role("heading", name="Part 2")).to_be_in_viewport()
+
+
 def test_a_job_is_canceled(page: Page, url: str) -> None:
     page.goto(f"{url}/#/jobs")
-    work = {"preset": "doublet-shear", "set": {"criteria.revolutions": 1000, "horizon": 1e5}}
+    work = {"preset": "doublet-shear", "set": {"criteria.revolutions": 1000, "horizon": 4e5}}
     job = httpx2.post(f"{url}/jobs", json=work).json()
     row = page.get_by_role("row").filter(has=page.locator(f"#job-{job['id']}"))
     expect(row).to_contain_text("running")
@@ -467,7 +483,7 @@ def test_the_page_runs_no_script_but_its_own(page: Page, url: str) -> None:
 def test_a_job_is_followed_across_a_restart_of_the_service(page: Page, tmp_path: Path) -> None:
     store = tmp_path / "store"
     first = start_service(store, "--workers=0")
-    work = {"preset": "doublet-shear", "set": {"horizon": 4.0, "criteria.extensions": 1.0}}
+    work = {"preset": "doublet-shear", "set": {"horizon": 4.0}}
     job = httpx2.post(f"{first.url}/jobs", json=work).json()
     page.goto(f"{first.url}/#/jobs/{job['id']}")
     expect(page.locator(".job-status")).to_contain_text("accepted")

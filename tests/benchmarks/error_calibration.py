@@ -45,7 +45,6 @@ def scenes(count: int, seed: int = 14) -> Iterator[Scene]:
             fields["vesicles"][1]["center"] = [1.5, 0.01]
             fields["horizon"] = 40.0
         fields["adhesion"] = {"hamaker": hamaker, "distance": float(random.choice([0.2, 0.4]))}
-        fields["criteria"] = {"extensions": 1.0}
         yield Scene.model_validate(fields)
 
 
@@ -72,9 +71,7 @@ def true_errors(run: Run, factor: int) -> dict[str, float | None]:
     output = Output(interval=run.time, frame_interval=run.time)  # a frame at the end of the run
     truth = at_its_end = simulate(finer(run.scene, factor, output=output))
     if truth.time < run.time:
-        undecided = Criteria(
-            extensions=1.0, revolutions=1000, separated_distance=1e6, steady_rate=1e-300, steady_time=1e6
-        )
+        undecided = Criteria(revolutions=1000, separated_distance=1e6, steady_rate=1e-300, steady_time=1e6)
         at_its_end = simulate(finer(run.scene, factor, output=output, horizon=run.time, criteria=undecided))
     same = run.outcome == truth.outcome
     return {

@@ -43,8 +43,8 @@ class Cut:
         return ["run", self.preset, *(f"--set={path}={value}" for path, value in self.changes.items())]
 
 
-SHEAR = {"horizon": 150.0, "criteria.revolutions": 1000, "criteria.extensions": 1.0}
-BRIEF = {"numerics.points": 32, "numerics.tolerance": 1e-4, "criteria.extensions": 1.0}
+SHEAR = {"horizon": 150.0, "criteria.revolutions": 1000}
+BRIEF = {"numerics.points": 32, "numerics.tolerance": 1e-4}
 CUTS = {
     "doublet in shear": Cut("doublet-shear", SHEAR),
     "trap, relaxed start": Cut("doublet-trap", {"numerics.tolerance": 1e-5}),

@@ -31,7 +31,7 @@ def main() -> None:
     """Simulate a row of vesicles and print what that needs."""
     points, vesicles, contrast = int(sys.argv[1]), int(sys.argv[2]), float(sys.argv[3])
     row = [{"reduced_area": 0.9, "center": [3.0 * number, 0.0]} for number in range(vesicles)]
-    changes = {"numerics.points": points, "horizon": 0.02, "criteria.extensions": 1.0, "vesicles": row}
+    changes = {"numerics.points": points, "horizon": 0.02, "vesicles": row}
     question = preset_question("doublet-shear", changes).changed({"vesicles.viscosity_contrast": contrast})
     before, most = private_bytes(), 0
 

@@ -14,7 +14,7 @@ from solver.simulation.simulate import simulate
 
 REFERENCE = 1e-9
 TOLERANCES = (1e-4, 3e-5, 1e-5)
-_ON = ("criteria.revolutions=20", "criteria.extensions=1", "output.frame_interval=2.0")
+_ON = ("criteria.revolutions=20", "output.frame_interval=2.0")
 SCENES = {
     "shear, H = 1.5": ("doublet-shear", (*_ON, "horizon=100")),
     "shear, H = 0.7": ("doublet-shear", (*_ON, "horizon=100", "adhesion.hamaker=0.7")),

@@ -18,7 +18,7 @@ from tests.api.processes import wait_until
 
 ROOT = Path(__file__).parents[2]
 SECONDS = 900  # to build; the image takes its packages from an index
-WORK = ("doublet-shear", {"horizon": 4.0, "criteria.extensions": 1.0})
+WORK = ("doublet-shear", {"horizon": 4.0})
 
 pytestmark = pytest.mark.long
 

@@ -239,7 +239,9 @@ class CatalogConformance:
         assert found("50% of _all_") == ["abc"]
         assert found("ab") == ["abd", "abc"]
         assert found("abc") == ["abc"]
-        assert found("%") == found("_b") == found("c") == found("crit") == []
+        assert found("crit") == ["ac", "abd"]
+        assert found("50%") == ["abc"]
+        assert found("%") == found("_b") == found("50_") == []
 
     def test_pages_of_boundaries_are_in_the_order_of_their_keys(self, store: Store) -> None:
         for study_key in "cab":

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from solver.scene import LARGEST_DENSE, PowerLaw, Scene
 from solver.simulation.simulate import simulate
-from tests.solver.scenes import fixed_horizon, uneven_pair, with_contrasts
+from tests.solver.scenes import uneven_pair, with_contrasts
 from tests.solver.suspensions import suspension
 
 HORIZON = 1e-3
@@ -13,8 +13,8 @@ COUNT = LARGEST_DENSE + 1
 
 def scenes_that_use_every_kernel() -> list[Scene]:
     """Return scenes of few and of many vesicles, with every formula of adhesion, and with a contrast."""
-    pair = uneven_pair(**fixed_horizon(HORIZON))
-    many = suspension(COUNT, **fixed_horizon(HORIZON))
+    pair = uneven_pair(horizon=HORIZON)
+    many = suspension(COUNT, horizon=HORIZON)
     adhesions = [
         PowerLaw(hamaker=1.0, distance=0.4, exponents=exponents, cutoff=cutoff)
         for exponents in ((4, 2), (5, 3))

@@ -70,7 +70,6 @@ def _document(random: np.random.Generator, wall_limit: float) -> dict[str, Any]:
             "work_limit": WORK_LIMIT,
             "wall_limit": wall_limit,
         },
-        "criteria": {"extensions": 1.0},
     }
     document["output"] = dict.fromkeys(("interval", "frame_interval"), document["horizon"] / 100)
     if kind != "rest":
@@ -103,7 +102,7 @@ def _placed(random: np.random.Generator, vesicle: dict[str, Any], gap: float) ->
 def objections(run: Run) -> list[str]:
     """What a run has done that no run may do, whatever its scene."""
     found = []
-    if not 0 <= run.time <= run.scene.latest_time:
+    if not 0 <= run.time <= run.scene.horizon:
         found.append(f"it ends at {run.time}")
     if (run.outcome is Outcome.FAILED) != bool(run.failure):
         found.append(f"{run.outcome} for the reason {run.failure!r}")

@@ -11,17 +11,17 @@ import numpy as np
 from solver import Run, Simulation
 from solver.memory import Saved
 from solver.scene import Extension, Numerics, PowerLaw, Scene, Shear, Start, Trap, Vesicle
-from tests.solver.scenes import fixed_horizon, shear_pair, with_contrasts
+from tests.solver.scenes import shear_pair, with_contrasts
 from tests.solver.suspensions import suspension
 
-SHORT = fixed_horizon(6.0)
+SHORT = {"horizon": 6.0}
 
 
 def numerics(**fields: Any) -> Numerics:
     return Numerics(**{"points": 32, "tolerance": 1e-3} | fields)
 
 
-ONE = Scene(vesicles=(Vesicle(reduced_area=0.8),), flow=Shear(rate=1.0), **fixed_horizon(4.0))
+ONE = Scene(vesicles=(Vesicle(reduced_area=0.8),), flow=Shear(rate=1.0), horizon=4.0)
 PAIR = shear_pair(1.0, rate=1.0, numerics=numerics(), **SHORT)
 RELAXED = Scene(
     vesicles=(Vesicle(center=(-1.2, 0.0)), Vesicle(center=(1.2, 0.0))),
@@ -29,7 +29,7 @@ RELAXED = Scene(
     flow=Trap(rate=0.1),
     start=Start(relaxed=True, horizon=400.0),
     numerics=numerics(),
-    **fixed_horizon(4.0),
+    horizon=4.0,
 )
 EXTENSION = suspension(3, horizon=2.0, flow=Extension(rate=0.2))
 

@@ -14,7 +14,7 @@ import numpy as np
 from solver import RESULTS_REVISION, Run, Scene, simulate
 from solver.flows import Extension, Shear, Trap
 from solver.scene import Numerics, PowerLaw, Start, Vesicle
-from tests.solver.scenes import fixed_horizon, shear_pair, uneven_pair, with_contrasts
+from tests.solver.scenes import shear_pair, uneven_pair, with_contrasts
 from tests.solver.suspensions import suspension
 
 STORED = Path(__file__).with_name("revision_results.json")
@@ -27,11 +27,11 @@ def _numerics(integrator: str, **fields: object) -> Numerics:
     return Numerics.model_validate({"points": 32, "tolerance": 1e-4, "integrator": integrator, **fields})
 
 
-SHORT = fixed_horizon(1.0)
+SHORT = {"horizon": 1.0}
 CLOSE = (Vesicle(center=(-0.8, 0.0)), Vesicle(length=5.0, center=(0.6, 0.0), angle=1.4))
 SCENES = {
     "one": Scene(vesicles=(Vesicle(reduced_area=0.8),), flow=Shear(rate=1.0), **SHORT),
-    "pair": shear_pair(1.5, numerics=Numerics(points="auto"), **fixed_horizon(3.0)),
+    "pair": shear_pair(1.5, numerics=Numerics(points="auto"), horizon=3.0),
     "bdf": uneven_pair(flow=Shear(rate=0.5), numerics=_numerics("bdf"), **SHORT),
     "rosenbrock": uneven_pair(flow=Extension(rate=0.3), numerics=_numerics("rosenbrock"), **SHORT),
     "sdc": uneven_pair(flow=Trap(rate=0.3), numerics=_numerics("sdc"), **SHORT),
@@ -41,7 +41,7 @@ SCENES = {
     "cutoff": uneven_pair(
         adhesion=PowerLaw(hamaker=1.5, distance=0.4, cutoff=1.1), numerics=_numerics("bdf"), **SHORT
     ),
-    "close": uneven_pair(vesicles=CLOSE, adhesion=None, flow=Shear(rate=0.5), **fixed_horizon(0.5)),
+    "close": uneven_pair(vesicles=CLOSE, adhesion=None, flow=Shear(rate=0.5), horizon=0.5),
     "contrast": with_contrasts(
         uneven_pair(flow=Shear(rate=0.5), numerics=_numerics("bdf"), **SHORT), 3.0, 0.5
     ),

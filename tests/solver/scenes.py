@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.membrane.geometry import Geometry, Membranes
-from solver.scene import Criteria, PowerLaw, Scene, Shear, Vesicle
+from solver.scene import PowerLaw, Scene, Shear, Vesicle
 from solver.simulation.initial_state import initial_ellipses
 
 Array = NDArray[np.float64]
 
 
-def shear_pair(hamaker: float, rate: float = 0.5, horizon: float = 100.0, **fields: Any) -> Scene:
+def shear_pair(hamaker: float, rate: float = 0.5, horizon: float = 400.0, **fields: Any) -> Scene:
     """The published scene: upright ellipses of reduced area 0.9, three lengths/2π apart, in shear."""
     return Scene(
         horizon=horizon,
@@ -23,11 +23,6 @@ def shear_pair(hamaker: float, rate: float = 0.5, horizon: float = 100.0, **fiel
         flow=Shear(rate=rate),
         **fields,
     )
-
-
-def fixed_horizon(horizon: float) -> dict[str, Any]:
-    """Fields of a scene that runs to its horizon, no longer."""
-    return {"horizon": horizon, "criteria": Criteria(extensions=1.0)}
 
 
 def uneven_pair(hamaker: float = 1.5, exponents: tuple[int, int] = (4, 2), **fields: Any) -> Scene:

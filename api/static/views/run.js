@@ -84,7 +84,7 @@ function keepTime(player, query) {
 
 /** @param {any} run */
 function heading({ key, outcome, time, scene, failure }) {
-  const verb = outcome === "undecided" || outcome === "failed" ? "ended" : "decided";
+  const verb = ["completed", "undecided", "failed"].includes(outcome) ? "ended" : "decided";
   return element(
     "div",
     { class: "heading" },

@@ -11,13 +11,13 @@ from matplotlib.figure import Figure
 from ensemble.display.progress import progress_text
 from ensemble.mpi.run_study import Snapshot, run_batch, run_study
 from ensemble.mpi.store_on_ranks import whole_store
-from ensemble.report import ReportName
+from ensemble.report import ReportName, report_directory
 from ensemble.report.paper.comparison import Comparison
 from ensemble.report.paper.paper_document import Paper, PaperSection, ReportFigure
-from ensemble.report.paper.paper_text import paper_conclusions, paper_page, paper_text
+from ensemble.report.paper.paper_text import paper_conclusions, paper_text
 from ensemble.report.paper.results import Results
 from ensemble.report.paper.section import Section, SectionContent, SectionFigure, SectionPlan
-from ensemble.report.report_files import FinishedReport, report_directory, write_report
+from ensemble.report.report_files import FinishedReport, write_report
 from ensemble.report.report_model import Machine
 
 if TYPE_CHECKING:
@@ -83,9 +83,9 @@ def make_paper(
         wall_seconds=time.perf_counter() - begin,
         parts=parts,
     )
-    directory = report_directory(whole_store(store), ReportName.PAPER)
+    directory = report_directory(whole_store(store).path, ReportName.PAPER)
     report = FinishedReport(directory, paper, paper_text(paper), paper_conclusions(paper))
-    write_report(report, figures, {"report.html": paper_page(paper)})
+    write_report(report, figures)
     return report
 
 

@@ -1,11 +1,8 @@
-"""The report on the paper as Markdown, and as the HTML page that is made from it."""
+"""The report on the paper as Markdown."""
 
 from __future__ import annotations
 
 from html import escape
-from string import Template
-
-from markdown_it import MarkdownIt
 
 from ensemble.report.markdown_table import bullets
 from ensemble.report.paper.comparison import PERCENT, Comparison, Value
@@ -18,27 +15,6 @@ _SOURCE = (
     "B. Quaife, S. Veerapaneni and Y.-N. Young, *Hydrodynamics and rheology of a vesicle doublet "
     "suspension*, Phys. Rev. Fluids (2019)"
 )
-
-_PAGE = Template("""<!doctype html>
-<html lang="en">
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>$title</title>
-<style>
-body { font: 16px/1.5 Georgia, serif; max-width: 58rem; margin: 2rem auto; padding: 0 1rem; color: #222; }
-h1, h2 { font-weight: normal; line-height: 1.2; }
-h2 { margin-top: 3rem; border-top: 1px solid #ccc; padding-top: 1rem; }
-img { display: block; max-width: 100%; margin: 1.5rem auto 0.3rem; }
-table { border-collapse: collapse; font: 13px/1.35 system-ui, sans-serif; display: block; overflow-x: auto; }
-th, td { padding: 0.25rem 0.6rem; text-align: left; border-bottom: 1px solid #e4e4e4; vertical-align: top; }
-td { font-variant-numeric: tabular-nums; }
-code { font-size: 0.85em; background: #f4f4f4; overflow-wrap: anywhere; }
-details { font-size: 0.9em; margin: 0.5rem 0 1.5rem; }
-em { color: #444; }
-</style>
-$body
-</html>
-""")
 
 
 def paper_conclusions(paper: Paper) -> list[str]:
@@ -65,15 +41,13 @@ def paper_conclusions(paper: Paper) -> list[str]:
     ]
 
 
-def paper_text(paper: Paper, suffix: str = ".png") -> str:
+def paper_text(paper: Paper) -> str:
     """Return the report as Markdown.
 
     Parameters
     ----------
     paper : Paper
         The report as data.
-    suffix : str
-        Which files of the figures to show, ``.png`` or ``.svg``.
 
     Returns
     -------
@@ -87,42 +61,20 @@ def paper_text(paper: Paper, suffix: str = ".png") -> str:
         "*deviation* is that of the computed value from the published one; for brackets it is the distance "
         "between them, 0 where they overlap.",
         f"Made on: {paper.machine.sentence()}.",
-        "\n".join(f"- [{part.title}](#{_anchor(part)})" for part in paper.parts),
-        *(text for part in paper.parts for text in _part_text(part, suffix)),
+        *(text for part in paper.parts for text in _part_text(part)),
     ]
     return "\n\n".join(sections) + "\n"
 
 
-def paper_page(paper: Paper) -> str:
-    """Return the report as an HTML page.
-
-    Parameters
-    ----------
-    paper : Paper
-        The report as data.
-
-    Returns
-    -------
-    str
-        The page.
-    """
-    markdown = MarkdownIt("commonmark").enable("table")
-    return _PAGE.substitute(title="The paper, recomputed", body=markdown.render(paper_text(paper, ".svg")))
-
-
-def _anchor(part: PaperSection) -> str:
-    return f"section-{part.name}"
-
-
-def _part_text(part: PaperSection, suffix: str) -> list[str]:
-    texts = [f'<a id="{_anchor(part)}"></a>', f"## {part.title}"]
+def _part_text(part: PaperSection) -> list[str]:
+    texts = [f"## {part.title}"]
     for element in part.content:
         match element:
             case str():
                 texts.append(element)
             case ReportFigure():
                 texts += [
-                    f"![{element.name}]({element.name}{suffix})",
+                    f"![{element.name}]({element.name}.png)",
                     f"*{element.caption}*",
                     f"`{element.command}`",
                 ]

@@ -11,8 +11,8 @@ import numpy as np
 
 from ensemble.mpi.scaling_model import ScalingModel
 from ensemble.mpi.store_on_ranks import whole_store
-from ensemble.report import ReportName
-from ensemble.report.report_files import FinishedReport, report_directory, write_report
+from ensemble.report import ReportName, report_directory
+from ensemble.report.report_files import FinishedReport, write_report
 from ensemble.report.report_model import Machine
 from ensemble.report.scaling.scaling_document import (
     CollectiveTime,
@@ -54,7 +54,8 @@ def make_scaling(
 ) -> FinishedReport | None:
     """Measure on 1, 2, 4, … and all ranks, then write ``reports/scaling/`` in the store.
 
-    Collective.  The files are ``report.md``, ``report.json`` and the figures, as PNG and as SVG.
+    Collective.  The files are ``report.md``, ``report.html``, ``report.json`` and the figures, as PNG and as
+    SVG.
 
     Parameters
     ----------
@@ -77,7 +78,7 @@ def make_scaling(
         return None
     figures = scaling_figures(document)
     text = scaling_text(document, [f"{name}.png" for name in figures])
-    directory = report_directory(whole_store(store), ReportName.SCALING)
+    directory = report_directory(whole_store(store).path, ReportName.SCALING)
     report = FinishedReport(directory, document, text, scaling_conclusions(document))
     write_report(report, figures)
     return report

@@ -37,7 +37,7 @@ _OTHERS: tuple[tuple[str, dict[str, Any]], ...] = (
     *((f"distance {distance:g}", {"adhesion.distance": distance}) for distance in (0.2, 0.3)),
 )
 _STUDY, _BEYOND = "default study", "beyond"
-_HORIZON = 1600.0  # that of the study
+_HORIZON = 6400.0  # that of the study
 _RATE, _HAMAKER = 0.5, 1.0  # of the others
 
 

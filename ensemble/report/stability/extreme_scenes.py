@@ -36,7 +36,7 @@ AT_REST, IN_FLOW, LONG = 50.0, 20.0, 1e4  # horizons
 def _scene(*vesicles: Vesicle, **fields: Any) -> Scene:
     """Return a scene with these vesicles and fields of `Scene`, `Numerics` and `Criteria`."""
     numerics = Numerics(**({"work_limit": WORK_LIMIT} | _fields_of(Numerics, fields)))
-    criteria = Criteria(**({"extensions": 1.0} | _fields_of(Criteria, fields)))
+    criteria = Criteria(**_fields_of(Criteria, fields))
     horizon = fields.pop("horizon", IN_FLOW if "flow" in fields else AT_REST)
     return Scene(
         horizon=horizon,

@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from ensemble.config.run_key import run_key
-from ensemble.report import ReportName
-from ensemble.report.report_files import FinishedReport, report_directory, write_report
+from ensemble.report import ReportName, report_directory
+from ensemble.report.report_files import FinishedReport, write_report
 from ensemble.report.report_model import Machine
 from ensemble.report.stability.bound_pairs import bound_pairs, pair_symmetry
 from ensemble.report.stability.extreme_scenes import EXTREME_SCENES
@@ -37,8 +37,8 @@ SceneGroups = Mapping[str, Mapping[str, Scene]]
 def make_stability(store: Store, quick: bool, log: Callable[[str], None]) -> FinishedReport:
     """Make the runs that the store does not have, then write ``reports/stability/`` in the store.
 
-    The files are ``report.md``, ``report.json`` and the figure, as PNG and as SVG; each appears complete or
-    not at all.
+    The files are ``report.md``, ``report.html``, ``report.json`` and the figure, as PNG and as
+    SVG; each appears complete or not at all.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def make_stability(store: Store, quick: bool, log: Callable[[str], None]) -> Fin
     )
     figures = {"scenes": stability_figure(document)}
     text = stability_text(document, [f"{name}.png" for name in figures])
-    directory = report_directory(store, ReportName.STABILITY)
+    directory = report_directory(store.path, ReportName.STABILITY)
     report = FinishedReport(directory, document, text, stability_conclusions(document))
     write_report(report, figures)
     return report

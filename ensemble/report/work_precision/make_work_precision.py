@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from ensemble.report import ReportName
-from ensemble.report.report_files import FinishedReport, report_directory, write_report
+from ensemble.report import ReportName, report_directory
+from ensemble.report.report_files import FinishedReport, write_report
 from ensemble.report.report_model import Machine
 from ensemble.report.timed_runs import TimedRuns
 from ensemble.report.work_precision.doublet_answers import critical_brackets, doublet_answers
@@ -25,8 +25,8 @@ from solver.scene import Scene
 def make_work_precision(store: Store, quick: bool, log: Callable[[str], None]) -> FinishedReport:
     """Make the runs that the store does not have, then write ``reports/work-precision/`` in the store.
 
-    The files are ``report.md``, ``report.json`` and the figures, as PNG and as SVG; each appears complete or
-    not at all.
+    The files are ``report.md``, ``report.html``, ``report.json`` and the figures, as PNG and as
+    SVG; each appears complete or not at all.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def make_work_precision(store: Store, quick: bool, log: Callable[[str], None]) -
     document = measure_work_precision(TimedRuns(store, log), QUICK if quick else FULL, SHORT_SCENES)
     figures = work_precision_figures(document)
     text = work_precision_text(document, [f"{name}.png" for name in figures])
-    directory = report_directory(store, ReportName.WORK_PRECISION)
+    directory = report_directory(store.path, ReportName.WORK_PRECISION)
     report = FinishedReport(directory, document, text, work_precision_conclusions(document))
     write_report(report, figures)
     return report

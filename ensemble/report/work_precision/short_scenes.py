@@ -13,7 +13,7 @@ def _to_the_horizon(scene: Scene) -> Scene:
     """Return the scene so that nothing ends it before or after its horizon, recorded at both ends only."""
     return scene.model_copy(
         update={
-            "criteria": Criteria(extensions=1.0, steady_time=2 * scene.horizon),
+            "criteria": Criteria(steady_time=2 * scene.horizon),
             "output": Output(interval=scene.horizon, frame_interval=scene.horizon),
         }
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from solver.analysis.criteria.completed import Completed
 from solver.analysis.criteria.criterion import Criterion, History
 from solver.analysis.criteria.revolved import Revolved
 from solver.analysis.criteria.separated import Separated
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
     from solver.scene import Scene
 
 # In the order in which they are asked; the first one with an answer decides.
-CRITERIA: list[type[Criterion]] = [Separated, Tumbled, Revolved, Steady]
+CRITERIA: list[type[Criterion]] = [Separated, Tumbled, Revolved, Steady, Completed]
 
 
 def criteria_for(scene: Scene) -> tuple[Criterion, ...]:

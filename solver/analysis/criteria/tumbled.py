@@ -48,5 +48,5 @@ class Tumbled(Criterion):
         assert axis
         if axis.half_turns < 2 * criteria.revolutions:
             return None
-        last = history.time >= self._scene.latest_time
+        last = history.time >= self._scene.horizon
         return Outcome.TUMBLING if last or axis.has_settled(criteria.settled_change) else None

@@ -288,25 +288,26 @@ def test_the_estimate_is_points_times_vesicles_times_time(submitting):
     scene = load_scene("doublet-shear").model_dump(mode="json")
     estimate = submitting.post("/estimate", json={"scene": scene}).json()
     assert estimate["runs"] == 1
-    assert estimate["cost"] == 64 * 2 * 100.0 * 4
+    assert estimate["cost"] == 64 * 2 * 400.0
     many = {"preset": "suspension-shear", "set": {"arrangement.count": 40}}
-    assert submitting.post("/estimate", json=many).json()["cost"] == 64 * 40 * 20.0 * 4
+    assert submitting.post("/estimate", json=many).json()["cost"] == 64 * 40 * 20.0
     finer = submitting.post("/estimate", json={"scene": scene, "set": {"numerics.points": 128}}).json()
     assert finer["cost"] == 2 * estimate["cost"]
     study = submitting.post("/estimate", json={"preset": "critical-hamaker"}).json()
     certified = submitting.post(
         "/estimate", json={"preset": "critical-hamaker", "set": {"search.certify": True}}
     ).json()
-    assert certified["runs"] == study["runs"] + 2 * 6
-    assert study["cost"] == study["runs"] * 64 * 2 * 1600.0 * 4
-    assert certified["cost"] == study["cost"] + 2 * 6 * 128 * 2 * 1600.0 * 4
+    # Two runs at each point have twice the points: they confirm, or certify.
+    assert certified["runs"] == study["runs"]
+    assert study["cost"] == (study["runs"] + 2 * 6) * 64 * 2 * 6400.0
+    assert certified["cost"] == study["cost"]
 
 
 def test_a_job_that_costs_too_much_is_refused_with_the_number(store):
-    cost = 64 * 2 * 100.0 * 4
+    cost = 64 * 2 * 400.0
     with client_of(store, maximum_cost=cost) as client:
         submit(client, preset="doublet-shear")
-        changes = {"horizon": 101.0}
+        changes = {"horizon": 401.0}
         estimate = client.post("/estimate", json={"preset": "doublet-shear", "set": changes}).json()
         assert not estimate["accepted"]
         refused = client.post("/jobs", json={"preset": "doublet-shear", "set": changes})

@@ -10,7 +10,7 @@ import xarray
 from zarr.storage import ZipStore
 
 UNITS = ("--set=units.radius=10 um", "--set=units.bending_modulus=1e-19 J", "--set=units.viscosity=1 mPa*s")
-SHORT = ("--set=numerics.points=32", "--set=numerics.tolerance=1e-3", "--set=criteria.extensions=1.0")
+SHORT = ("--set=numerics.points=32", "--set=numerics.tolerance=1e-3")
 
 
 @pytest.fixture(scope="module")

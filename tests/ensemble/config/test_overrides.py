@@ -9,7 +9,7 @@ import pytest
 from pydantic import ValidationError
 
 from ensemble.config.dotted_paths import locations
-from ensemble.config.overrides import override, parse_override
+from ensemble.config.overrides import LONGEST_NAME, override, parse_override
 from ensemble.config.validation import explain
 from solver.scene import Scene
 
@@ -146,6 +146,26 @@ def test_an_unknown_kind_of_flow_is_told_the_known_ones() -> None:
     message = refusal({"flow.kind": "vortex"})
     assert message.startswith("flow: ")
     assert all(kind in message for kind in ("vortex", "shear", "extension", "trap"))
+
+
+@pytest.mark.parametrize(
+    ("changes", "name"),
+    [
+        ({}, "mine"),
+        ({"scene.horizon": 20.0}, "mine, scene.horizon=20.0"),
+        ({"scene.horizon": 20.0, "sweep.values": [0.5]}, "mine, scene.horizon=20.0, sweep.values=[0.5]"),
+        ({"scene.horizon": 10.0}, "mine"),  # as it was
+        ({"scene.flow.kind": "trap"}, 'mine, scene.flow.kind="trap"'),
+        ({"name": "yours", "scene.horizon": 20.0}, "yours"),
+        ({"scene.note": "x" * 200}, 'mine, scene.note="' + "x" * 81 + "…"),
+    ],
+)
+def test_a_changed_document_with_a_name_is_called_after_its_changes(
+    changes: dict[str, Any], name: str
+) -> None:
+    changed = override({"name": "mine", "scene": {"horizon": 10.0}}, changes)
+    assert changed["name"] == name
+    assert len(name) <= LONGEST_NAME
 
 
 SUSPENSION: dict[str, Any] = {

@@ -51,6 +51,8 @@ def test_keys_are_those_of_the_answers() -> None:
 
 def test_a_question_is_called_as_its_document_its_preset_or_its_kind() -> None:
     assert preset_question("critical-hamaker", {"name": "mine"}).name == "mine"
+    changed = preset_question("critical-hamaker", {"sweep.values": [0.5]})
+    assert changed.name == changed.document.name == "critical-hamaker, sweep.values=[0.5]"
     assert preset_question("doublet-shear", {"horizon": 5.0}).name == "doublet-shear"
     assert SceneQuestion(load_scene("doublet-shear")).name == "scene"
 
@@ -74,13 +76,13 @@ def test_two_runs_at_finer_numerics_are_planned_at_each_point() -> None:
 
 
 def test_a_run_that_would_record_too_much_is_refused_by_its_interval() -> None:
-    time = load_scene("doublet-shear").horizon * load_scene("doublet-shear").criteria.extensions
+    time = load_scene("doublet-shear").horizon
     least = time / MOST_RECORDS
     assert preset_question("doublet-shear", {"output.interval": 1.01 * least}).cost.runs == 1
     with pytest.raises(ValueError, match=r"output\.interval must be at least"):
         preset_question("doublet-shear", {"output.interval": 0.99 * least})
     # Also where only one limit of a search makes a run so long.
-    changes = {"search.parameter": "horizon", "search.limits": [1.0, 1e4], "search.guesses": []}
+    changes = {"search.parameter": "horizon", "search.limits": [1.0, 4e4], "search.guesses": []}
     with pytest.raises(ValueError, match=r"output\.interval"):
         _ = preset_question("critical-hamaker", changes | {"scene.output.interval": 1e-2}).cost
 

@@ -31,7 +31,7 @@ from ensemble.store.run_record import RunSummary, arrays
 from ensemble.store.written_arrays import read_written
 from ensemble.store.zarr_groups import ARCHIVE
 from solver.analysis.run import Outcome, Run
-from solver.scene import Criteria, Numerics
+from solver.scene import Numerics
 from solver.simulation.simulate import simulate
 from tests.ensemble.group_files import unpack, unpacked
 from tests.ensemble.runs import assert_same_run, failed_run, shear_run, shear_scene
@@ -167,7 +167,7 @@ def test_run_comes_back_bit_for_bit(store: Store, run: Run) -> None:
 def test_a_run_whose_points_were_raised_comes_back(store: Store) -> None:
     """Its frames are checked against the number it ended with, which filters find, too."""
     scene = shear_scene().model_copy(update={"numerics": Numerics(points="auto"), "horizon": 8.0})
-    run = simulate(scene.model_copy(update={"criteria": Criteria(extensions=1.0)}))
+    run = simulate(scene)
     assert run.work.points
     assert run.work.points > 32
     store.save(run)

@@ -12,7 +12,7 @@ from solver.analysis.run import Outcome, Run
 from solver.forces.tension import TensionNotFoundError
 from solver.scene import Extension, Numerics
 from solver.simulation.simulate import simulate
-from tests.solver.scenes import fixed_horizon, shear_pair
+from tests.solver.scenes import shear_pair
 
 FACTOR = 3.0  # that is promised
 
@@ -23,7 +23,7 @@ def run_at(tolerance: float, hamaker: float, **fields: Any) -> Run:
 
 
 def test_period_and_viscosity_of_a_pair_that_stays_together() -> None:
-    run, truth = (run_at(tolerance, 1.5, horizon=60.0) for tolerance in (1e-4, 1e-8))
+    run, truth = (run_at(tolerance, 1.5, horizon=240.0) for tolerance in (1e-4, 1e-8))
     assert run.outcome is Outcome.BOUND
     assert run.period
     assert truth.period
@@ -38,7 +38,7 @@ def test_period_and_viscosity_of_a_pair_that_stays_together() -> None:
 
 
 def test_time_of_separation() -> None:
-    run, truth = (run_at(tolerance, 0.2, horizon=120.0) for tolerance in (1e-5, 1e-8))
+    run, truth = (run_at(tolerance, 0.2, horizon=480.0) for tolerance in (1e-5, 1e-8))
     assert run.outcome is truth.outcome is Outcome.SEPARATED
     assert run.error.time
     assert run.error.time / FACTOR < abs(run.time - truth.time) < FACTOR * run.error.time
@@ -48,14 +48,14 @@ def test_time_of_separation() -> None:
 
 def test_a_pair_that_might_come_back_is_sensitive() -> None:
     """At shear rate 0.5 the critical adhesion strength is 0.36, with 64 points as with 32."""
-    run = run_at(1e-3, 0.35, horizon=200.0)
+    run = run_at(1e-3, 0.35, horizon=800.0)
     assert run.outcome is Outcome.SEPARATED
     assert run.sensitive
-    assert not run_at(1e-5, 0.35, horizon=200.0).sensitive
+    assert not run_at(1e-5, 0.35, horizon=800.0).sensitive
 
 
 def test_inclination_of_a_pair_in_strain() -> None:
-    fields = fixed_horizon(10.0) | {"flow": Extension(rate=0.05)}
+    fields = {"horizon": 10.0} | {"flow": Extension(rate=0.05)}
     run, truth = (run_at(tolerance, 1.5, **fields) for tolerance in (1e-4, 1e-8))
     assert run.inclination_angle is not None
     assert truth.inclination_angle is not None
@@ -66,7 +66,7 @@ def test_inclination_of_a_pair_in_strain() -> None:
 @pytest.mark.parametrize("integrator", ["rosenbrock", "sdc"])
 def test_what_does_not_propagate_errors_reports_none(integrator: str) -> None:
     numerics = Numerics(points=32, tolerance=1e-3, integrator=integrator)
-    run = simulate(shear_pair(1.5, numerics=numerics, **fixed_horizon(0.5)))
+    run = simulate(shear_pair(1.5, numerics=numerics, horizon=0.5))
     assert run.error.global_ is None
     assert run.error.viscosity is None
 

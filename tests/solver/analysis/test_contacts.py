@@ -9,7 +9,7 @@ from solver.analysis.contacts import CONTACT, cluster_sizes, clusters, contacts
 from solver.scene import Numerics, Output, PowerLaw, Scene, Shear, Vesicle
 from solver.scene.arrangement import Lattice
 from solver.simulation.simulate import simulate
-from tests.solver.scenes import fixed_horizon, geometry_of, shear_pair
+from tests.solver.scenes import geometry_of, shear_pair
 
 CIRCLE = Vesicle(reduced_area=1.0)
 
@@ -73,7 +73,7 @@ def test_what_a_scene_does_not_need_is_not_measured(aggregating: Scene, monkeypa
     alone = simulate(aggregating.model_copy(update={"adhesion": None, "horizon": 0.5}))
     assert "vesicle_cluster" not in alone.vesicle_series
     assert not {"clusters", "largest_cluster"} & alone.series.keys()
-    pair = simulate(shear_pair(1.5, numerics=Numerics(points=32), **fixed_horizon(1.0)))
+    pair = simulate(shear_pair(1.5, numerics=Numerics(points=32), horizon=1.0))
     assert pair.vesicle_series == {}
     assert not {"clusters", "largest_cluster"} & pair.series.keys()
 

@@ -56,7 +56,6 @@ DOCUMENT = """
     horizon = 3.0
     vesicles = [{ center = [-1.6, 0.4] }, { center = [1.6, -0.4] }]
     flow = { kind = "added-poiseuille", rate = 0.2, half_width = 4.0 }
-    criteria = { extensions = 1.0 }
 """
 
 

@@ -17,7 +17,7 @@ from solver.integrators.bdf import backward_differentiation
 from solver.integrators.integrator import FACTORIES, register, unregister
 from solver.scene import Numerics
 from solver.scene.numerics import INTEGRATORS
-from tests.solver.scenes import fixed_horizon, shear_pair
+from tests.solver.scenes import shear_pair
 from tests.solver.steps import amplification, oscillator_errors
 
 Array = NDArray[np.float64]
@@ -51,7 +51,7 @@ def test_every_name_of_a_scene_has_an_integrator() -> None:
 def test_an_integrator_that_is_added_runs_a_scene(ros2: dict[str, Any]) -> None:
     def final(**numerics: object) -> Array:
         chosen = Numerics.model_validate({"points": 32, **numerics})
-        run = simulate(shear_pair(1.5, numerics=chosen, **fixed_horizon(3.0)))
+        run = simulate(shear_pair(1.5, numerics=chosen, horizon=3.0))
         assert run.failure is None
         return np.append(run.frames.tangent_angle[-1], run.frames.center[-1])
 

@@ -14,7 +14,7 @@ from solver.integrators.control import root_mean_square
 from solver.integrators.one_step import OneStepIntegrator
 from solver.scene import Criteria, Numerics, Scene, Shear, Vesicle
 from solver.simulation.simulate import simulate
-from tests.solver.scenes import fixed_horizon, shear_pair
+from tests.solver.scenes import shear_pair
 from tests.solver.steps import FunctionEquation
 
 Array = NDArray[np.float64]
@@ -51,7 +51,7 @@ def test_combinations_that_do_not_exist_are_refused_by_name(
     ("integrator", "order"), [("rosenbrock", None), ("sdc", 2), ("sdc", 4), ("sdc", 5), ("imex-euler", None)]
 )
 def test_the_error_of_a_run_falls_with_the_tolerance(integrator: str, order: int | None) -> None:
-    fields = fixed_horizon(5.0)
+    fields = {"horizon": 5.0}
 
     def final(**numerics: object) -> Array:
         run = simulate(
@@ -94,7 +94,7 @@ def test_step_control_by_area_and_length_bounds_their_drift(order: int) -> None:
         numerics = Numerics(
             points=64, integrator="sdc", order=order, step_control="area-length", tolerance=tolerance
         )
-        run = simulate(shear_pair(1.5, numerics=numerics, **fixed_horizon(30.0)))
+        run = simulate(shear_pair(1.5, numerics=numerics, horizon=30.0))
         assert run.failure is None
         assert run.time == 30.0
         assert run.error.area < 1.2 * tolerance

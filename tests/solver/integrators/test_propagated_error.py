@@ -14,7 +14,7 @@ from solver.motion.jacobian import DenseJacobian
 from solver.motion.terms import equation_of_motion
 from solver.scene import Numerics, Scene
 from solver.simulation.initial_state import initial_ellipses
-from tests.solver.scenes import fixed_horizon, shear_pair
+from tests.solver.scenes import shear_pair
 from tests.solver.steps import FunctionEquation, all_steps
 from tests.solver.suspensions import suspension
 
@@ -78,7 +78,7 @@ def final(scene: Scene, tolerance: float) -> tuple[Array, Array]:
 @pytest.mark.parametrize(("hamaker", "horizon"), [(1.5, 12.0), (0.38, 30.0)])
 def test_the_error_of_a_pair_is_found(hamaker: float, horizon: float) -> None:
     """Near the critical adhesion strength, 0.36, motion amplifies errors a hundredfold."""
-    scene = shear_pair(hamaker, **fixed_horizon(horizon), numerics=Numerics(points=48))
+    scene = shear_pair(hamaker, horizon=horizon, numerics=Numerics(points=48))
     exact, _ = final(scene, 1e-9)
     for tolerance in (1e-4, 1e-5):
         state, error = final(scene, tolerance)

@@ -9,7 +9,7 @@ import pytest
 
 from solver.membrane.symmetry import has_images, independent_vesicles
 from solver.motion.terms import dense_equation
-from solver.scene import Criteria, Extension, Numerics, PowerLaw, Scene, Shear, Start, Trap, Vesicle
+from solver.scene import Extension, Numerics, PowerLaw, Scene, Shear, Start, Trap, Vesicle
 from solver.simulation.initial_state import initial_ellipses
 from solver.simulation.simulate import simulate
 from tests.solver.scenes import shear_pair, smooth_direction
@@ -30,7 +30,6 @@ def tilted(flow: Shear | Extension | Trap | None, offset: float = 0.0) -> Scene:
         {"reduced_area": 0.8, "center": (-1.1 + offset, 0.2), "angle": 1.4},
         {"reduced_area": 0.8, "center": (1.1 + offset, -0.2), "angle": 1.4 - math.pi},
         flow=flow,
-        criteria=Criteria(extensions=1.0),
         numerics=Numerics(tolerance=1e-7),
     )
 

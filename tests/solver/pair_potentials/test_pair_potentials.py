@@ -29,7 +29,7 @@ from solver.potentials.proximity import Closeness, Proximity
 from solver.scene import LARGEST_DENSE, Numerics, Scene
 from solver.simulation.initial_state import initial_ellipses
 from solver.simulation.simulate import simulate
-from tests.solver.scenes import fixed_horizon, smooth_direction, uneven_pair
+from tests.solver.scenes import smooth_direction, uneven_pair
 from tests.solver.suspensions import suspension
 
 Array = NDArray[np.float64]
@@ -144,7 +144,7 @@ def document(scene: Scene, **adhesion: Any) -> Scene:
 @pytest.mark.parametrize("cutoff", [None, CUTOFF])
 @pytest.mark.parametrize(
     "scene",
-    [uneven_pair(**fixed_horizon(0.3)), suspension(LARGEST_DENSE + 1, **fixed_horizon(0.3))],
+    [uneven_pair(horizon=0.3), suspension(LARGEST_DENSE + 1, horizon=0.3)],
     ids=["pair", "many"],
 )
 @pytest.mark.usefixtures("registered")

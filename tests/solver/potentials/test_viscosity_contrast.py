@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from solver.analysis.run import Outcome
 from solver.motion.terms import dense_equation
-from solver.scene import Criteria, Extension, Flow, Numerics, Scene, Shear, Trap, Vesicle
+from solver.scene import Extension, Flow, Numerics, Scene, Shear, Trap, Vesicle
 from solver.simulation.initial_state import initial_ellipses
 from solver.simulation.simulate import simulate
 from tests.solver.references import Ellipse
@@ -164,7 +164,7 @@ def test_close_vesicles_of_unequal_viscosities_are_resolved() -> None:
 
 def test_a_pair_with_contrasts_runs_as_its_half() -> None:
     """A vesicle and its image, against both computed."""
-    half = with_contrasts(shear_pair(1.5, horizon=6.0, criteria=Criteria(extensions=1.0)), 5.0, 5.0)
+    half = with_contrasts(shear_pair(1.5, horizon=6.0), 5.0, 5.0)
     first, second = half.vesicles
     whole = half.model_copy(
         update={"vesicles": (first, second.model_copy(update={"center": (1.5 + 1e-12, 0.0)}))}

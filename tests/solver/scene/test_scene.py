@@ -87,7 +87,6 @@ def test_the_document_itself_is_valid() -> None:
         ("numerics.integrator", "euler"),
         ("numerics.work_limit", 0),
         ("criteria", {"revolutions": 0}),
-        ("criteria", {"extensions": 0.5}),
         ("criteria", {"separated_distance": 0.0}),
         ("output", {"interval": 0.0}),
         ("output", {"frame_interval": -1.0}),

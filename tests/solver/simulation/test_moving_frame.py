@@ -15,7 +15,7 @@ from solver.simulation.initial_state import initial_ellipses
 from solver.simulation.simulate import simulate
 from tests.solver.scenes import uneven_pair
 
-AT_ONCE = Criteria(steady_time=1e6, extensions=1.0)
+AT_ONCE = Criteria(steady_time=1e6)
 
 
 def shifted(scene: Scene, offset: tuple[float, float]) -> Scene:

@@ -15,18 +15,18 @@ from solver.analysis.run import Run
 from solver.flows import Shear, Trap
 from solver.scene import Numerics, Output, PowerLaw, Scene, Start, Vesicle
 from solver.simulation.simulate import simulate
-from tests.solver.scenes import fixed_horizon, shear_pair, uneven_pair, with_contrasts
+from tests.solver.scenes import shear_pair, uneven_pair, with_contrasts
 from tests.solver.suspensions import suspension
 
 COARSE = {"points": 32, "tolerance": 1e-3}
 CUTOFF = PowerLaw(hamaker=1.5, distance=0.4, cutoff=1.2)
 
 SCENES = {
-    "one": Scene(vesicles=(Vesicle(reduced_area=0.8),), flow=Shear(rate=1.0), **fixed_horizon(3.0)),
-    "pair": shear_pair(1.5, **fixed_horizon(3.0)),
-    "uneven": uneven_pair(flow=Shear(rate=0.5), **fixed_horizon(2.0)),
-    "contrast": with_contrasts(uneven_pair(flow=Shear(rate=0.5), **fixed_horizon(1.0)), 3.0, 0.5),
-    "cutoff": uneven_pair(adhesion=CUTOFF, flow=Shear(rate=0.5), **fixed_horizon(1.0)),
+    "one": Scene(vesicles=(Vesicle(reduced_area=0.8),), flow=Shear(rate=1.0), horizon=3.0),
+    "pair": shear_pair(1.5, horizon=3.0),
+    "uneven": uneven_pair(flow=Shear(rate=0.5), horizon=2.0),
+    "contrast": with_contrasts(uneven_pair(flow=Shear(rate=0.5), horizon=1.0), 3.0, 0.5),
+    "cutoff": uneven_pair(adhesion=CUTOFF, flow=Shear(rate=0.5), horizon=1.0),
     "eight": suspension(8),
     "eight-cutoff": suspension(8, adhesion=CUTOFF),
 }
@@ -80,8 +80,8 @@ DECIDED = {
     "tumbling": with_contrasts(
         Scene(horizon=50.0, vesicles=(Vesicle(reduced_area=0.8),), flow=Shear(rate=2.0)), 15.0
     ),
-    "trapped": uneven_pair(flow=Trap(rate=0.1), start=Start(relaxed=True, tilt=0.3), **fixed_horizon(300.0)),
-    "resting": uneven_pair(**fixed_horizon(300.0)),
+    "trapped": uneven_pair(flow=Trap(rate=0.1), start=Start(relaxed=True, tilt=0.3), horizon=300.0),
+    "resting": uneven_pair(horizon=300.0),
 }
 
 
@@ -144,7 +144,7 @@ def test_a_relaxed_start_is_the_same_however_often_it_is_recorded() -> None:
         flow=Trap(rate=0.02),
         start=Start(relaxed=True, tilt=0.05),
         numerics=Numerics.model_validate(COARSE),
-        **fixed_horizon(1.0),
+        horizon=1.0,
     )
     runs = [simulate(scene.model_copy(update={"output": output})) for output in (Output(), *OUTPUTS)]
     for run in runs:

@@ -31,7 +31,7 @@ from solver.simulation.resolution import (
     with_points,
 )
 from solver.simulation.simulate import simulate
-from tests.solver.scenes import fixed_horizon, shear_pair, uneven_pair
+from tests.solver.scenes import shear_pair, uneven_pair
 
 Array = NDArray[np.float64]
 
@@ -66,7 +66,7 @@ def strongly_adhering(hamaker: float, horizon: float) -> Scene:
         horizon=horizon,
         vesicles=vesicles,
         adhesion=PowerLaw(hamaker=hamaker, distance=0.4),
-        criteria=Criteria(extensions=1.0, steady_time=2 * horizon),
+        criteria=Criteria(steady_time=2 * horizon),
         output=Output(interval=0.1, frame_interval=0.5),
     )
 
@@ -211,7 +211,7 @@ def test_membranes_need_a_number_of_points() -> None:
 
 def test_a_run_that_is_raised_twice_is_the_fine_run(monkeypatch: pytest.MonkeyPatch) -> None:
     """With 48 points this scene is resolved to about the tolerance: raises alone could make a difference."""
-    scene = uneven_pair(flow=Shear(rate=0.5), **fixed_horizon(6.0))
+    scene = uneven_pair(flow=Shear(rate=0.5), horizon=6.0)
     scene = scene.model_copy(update={"output": Output(interval=0.25, frame_interval=0.5)})
     tolerance = 1e-6
     expected = simulate(fixed(scene, 96, tolerance))
@@ -230,7 +230,7 @@ def test_a_run_that_is_raised_twice_is_the_fine_run(monkeypatch: pytest.MonkeyPa
 
 
 def test_frames_of_all_parts_have_the_last_number_of_points(monkeypatch: pytest.MonkeyPatch) -> None:
-    scene = uneven_pair(flow=Shear(rate=0.5), **fixed_horizon(3.0))
+    scene = uneven_pair(flow=Shear(rate=0.5), horizon=3.0)
     expected = simulate(fixed(scene, 96, 1e-6)).frames
     scripted(monkeypatch, 48, {0.9: 64, 1.9: 96})
     frames = simulate(fixed(scene, 48, 1e-6)).frames
@@ -257,7 +257,7 @@ def test_the_work_of_all_parts_adds_up(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(terms, "dense_equation", of)
     script = scripted(monkeypatch, 32, {0.5: 48, 1.0: 64})
-    run = simulate(fixed(shear_pair(1.5, **fixed_horizon(2.0)), 32))
+    run = simulate(fixed(shear_pair(1.5, horizon=2.0), 32))
     assert [equation.membranes.points for equation in made] == [32, 48, 64]
     assert run.work.rhs_evaluations == sum(equation.evaluations + equation.recordings for equation in made)
     assert run.work.jacobian_evaluations >= 3
@@ -344,7 +344,7 @@ def test_a_pair_with_images_is_raised_like_one_without() -> None:
 
 
 def test_a_relaxed_start_goes_on_with_the_points_of_the_relaxation() -> None:
-    scene = strongly_adhering(30.0, 40.0).model_copy(update={"criteria": Criteria(extensions=1.0)})
+    scene = strongly_adhering(30.0, 40.0).model_copy(update={"criteria": Criteria()})
     at_rest = simulate(adaptive(scene))
     assert at_rest.outcome is Outcome.EQUILIBRIUM
     trapped = scene.model_copy(

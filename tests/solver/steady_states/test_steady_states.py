@@ -12,7 +12,7 @@ from solver.membrane.geometry import Geometry
 from solver.membrane.resampling import resampled_angle
 from solver.motion.equation import conserved_quantities
 from solver.motion.terms import accurate_equation
-from solver.scene import Criteria, Numerics, PowerLaw, Scene, Shear, Start, Trap, Vesicle
+from solver.scene import Numerics, PowerLaw, Scene, Shear, Start, Trap, Vesicle
 from solver.simulation.initial_state import initial_ellipses
 from solver.simulation.resolution import with_points
 from solver.simulation.simulate import simulate
@@ -48,7 +48,6 @@ def treading(contrast: float, points: int = 64) -> Scene:
         vesicles=(Vesicle(reduced_area=0.8, viscosity_contrast=contrast),),
         flow=Shear(rate=1.0),
         numerics=Numerics(points=points),
-        criteria=Criteria(extensions=1.0),
     )
 
 

@@ -58,7 +58,6 @@ class _Encounter(NamedTuple):
                 "flow.kind": flow,
                 # To the published end, whatever becomes of the pair before.
                 "criteria.steady_time": 200.0,
-                "criteria.extensions": 1.0,
                 "criteria.separated_distance": 1000.0,
             },
         )

@@ -37,9 +37,7 @@ class ShearDoublet(NamedTuple):
     def until_published_horizon(self) -> Case:
         """The run that ends when the published runs end, however often the pair has turned."""
         horizon = published()["settings"]["horizon"]
-        return self.case.with_changes(
-            {"horizon": horizon, "criteria.extensions": 1.0, "criteria.revolutions": _UNREACHED}
-        )
+        return self.case.with_changes({"horizon": horizon, "criteria.revolutions": _UNREACHED})
 
     @property
     def _changes(self) -> dict[str, Any]:

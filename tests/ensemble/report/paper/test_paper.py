@@ -16,7 +16,7 @@ from ensemble.report.paper.case import Case, StudyCase
 from ensemble.report.paper.comparison import compare_intervals, compare_numbers, compare_words, runs_of
 from ensemble.report.paper.least_squares import power_law
 from ensemble.report.paper.paper_document import Paper, PaperSection, ReportFigure
-from ensemble.report.paper.paper_text import paper_page, paper_text
+from ensemble.report.paper.paper_text import paper_text
 from ensemble.report.paper.sections import SECTIONS, sections_named
 from ensemble.report.report_model import Machine
 from ensemble.store import Store
@@ -85,7 +85,7 @@ def test_a_power_law_is_found_with_its_uncertainty() -> None:
         power_law([1, 2], [1, 2])
 
 
-def test_text_and_page_say_the_same() -> None:
+def test_the_text_has_every_row_with_its_sources() -> None:
     rows = [
         compare_numbers("period, γ̇ = 0.5", 36.34, 36.22, runs_of(CASE), allowed=1),
         compare_intervals("H_c", (0.3, 0.4), (0.5, 0.51), allowed=3, note="a|b"),
@@ -94,7 +94,7 @@ def test_text_and_page_say_the_same() -> None:
     figure = ReportFigure(name="shear-period", caption="Period.", command=command)
     part = PaperSection(name="shear", title="Shear", content=["What *one* sees.", rows, figure])
     paper = Paper(quick=False, machine=Machine.here(), ranks=2, runs=3, wall_seconds=1.0, parts=[part])
-    text, page = paper_text(paper), paper_page(paper)
+    text = paper_text(paper)
     first, second, _ = text.split("\n\n")[1].splitlines()
     assert first == "- 1 of 2 values agree with the published ones within the allowed deviation."
     assert second == "- The others are in: Shear."
@@ -103,11 +103,7 @@ def test_text_and_page_say_the_same() -> None:
     assert CASE.key[:8] in text
     assert "(shear-period.png)" in text
     assert "ensemble report paper --only shear" in text
-    assert '<img src="shear-period.svg"' in page
-    assert page.count("<table>") == 1
-    assert "<td>36.22</td>" in page
-    assert "<summary>Runs and commands</summary>" in page
-    assert "<em>one</em>" in page
+    assert "<summary>Runs and commands</summary>" in text
 
 
 def test_sections_are_chosen_by_name(ensemble, tmp_path) -> None:

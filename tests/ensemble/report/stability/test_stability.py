@@ -121,7 +121,7 @@ def test_a_scene_that_raises_does_not_hide_the_others(store):
 def assert_written(directory: Path, document: Stability) -> None:
     """The files of a report are there, and hold it."""
     names = {file.name for file in directory.iterdir()}
-    assert names == {"report.md", "report.json", "scenes.png", "scenes.svg"}
+    assert names == {"report.md", "report.html", "report.json", "scenes.png", "scenes.svg"}
     assert Stability.model_validate_json((directory / "report.json").read_text()) == document
     assert (directory / "scenes.png").read_bytes().startswith(b"\x89PNG")
     assert all(row.scene in (directory / "report.md").read_text() for row in document.rows)

@@ -10,7 +10,7 @@ from solver.analysis.criteria import CRITERIA, Criterion, History
 from solver.analysis.run import Outcome
 from solver.scene import Scene, Vesicle
 from solver.simulation.simulate import simulate
-from tests.solver.scenes import fixed_horizon, uneven_pair
+from tests.solver.scenes import uneven_pair
 
 CLOSE = 0.4
 
@@ -33,7 +33,7 @@ def close() -> Iterator[None]:
     CRITERIA.remove(Close)
 
 
-PAIR = uneven_pair(**fixed_horizon(6.0))
+PAIR = uneven_pair(horizon=6.0)
 
 
 @pytest.mark.usefixtures("close")
@@ -49,7 +49,7 @@ def test_it_ends_a_run_at_once() -> None:
 
 @pytest.mark.usefixtures("close")
 def test_it_leaves_other_scenes_alone() -> None:
-    run = simulate(Scene(vesicles=(Vesicle(),), **fixed_horizon(1.0)))
+    run = simulate(Scene(vesicles=(Vesicle(),), horizon=1.0))
     assert run.outcome is Outcome.UNDECIDED
 
 

@@ -10,7 +10,7 @@ from scipy.interpolate import CubicSpline
 from solver.analysis.run import Outcome, Run
 from solver.scene import Criteria, Extension, PowerLaw, Scene, Shear, Start, Trap, Vesicle
 from solver.simulation.simulate import simulate
-from tests.solver.scenes import fixed_horizon, shear_pair
+from tests.solver.scenes import shear_pair
 
 Array = NDArray[np.float64]
 
@@ -87,17 +87,19 @@ def test_more_revolutions_take_longer(bound: Run) -> None:
 
 
 def test_the_horizon_leaves_a_run_undecided() -> None:
-    run = simulate(shear_pair(3.5, **fixed_horizon(5.0)))
+    run = simulate(shear_pair(3.5, horizon=5.0))
     assert run.outcome is Outcome.UNDECIDED
     assert run.time == 5.0
     assert run.undecided == "the pair has made 0 full turns since it first stood across the flow"
     assert (run.period, run.settled) == (None, None)
 
 
-def test_an_undecided_pair_goes_on_beyond_the_horizon() -> None:
-    run = simulate(shear_pair(3.5, horizon=4.0, criteria=Criteria(extensions=2.0)))
-    assert run.outcome is Outcome.UNDECIDED
-    assert run.time == 8.0
+def test_a_scene_of_three_vesicles_is_completed_at_its_horizon() -> None:
+    vesicles = tuple(Vesicle(center=(3.0 * i, 0.0)) for i in range(3))
+    run = simulate(Scene(horizon=0.5, vesicles=vesicles, flow=Shear(rate=0.5)))
+    assert run.outcome is Outcome.COMPLETED
+    assert run.time == 0.5
+    assert run.undecided is None
 
 
 def far_apart(direction: float, flow: Extension | Shear) -> Scene:
