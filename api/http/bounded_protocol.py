@@ -6,9 +6,13 @@ import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum, auto
+from http import HTTPStatus
 from typing import Any
 
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
+
+from api.http.middleware import ENCODED_HEADERS
+from api.http.problems import Problem, problem_response
 
 _END_OF_HEAD = b"\r\n\r\n"
 _GRACE_SECONDS = 1.0  # for the application to answer that a body was too slow, before the connection ends
@@ -185,6 +189,20 @@ class BoundedProtocol(HttpToolsProtocol):
         """Limit the idle time, if the request has arrived and all answers have been sent."""
         if self._phase is _Phase.NOTHING and self.cycle.response_complete:
             self._expect(_Phase.NOTHING, self.limits.idle_seconds, self._close)
+
+    def send_400_response(self, msg: str) -> None:
+        """Answer what is no request of HTTP with a problem, as all else that is refused.
+
+        Parameters
+        ----------
+        msg : str
+            What is wrong.
+        """
+        answer = problem_response(Problem(HTTPStatus.BAD_REQUEST, msg))
+        headers = [*answer.raw_headers, *ENCODED_HEADERS, (b"connection", b"close")]
+        lines = [b"HTTP/1.1 400 Bad Request", *(b"%s: %s" % header for header in headers)]
+        self.transport.write(b"\r\n".join(lines) + b"\r\n\r\n" + bytes(answer.body))
+        self.transport.close()
 
     def _refuse(self) -> None:
         is_answering = self.cycle is not None and not self.cycle.response_complete

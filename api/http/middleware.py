@@ -22,7 +22,7 @@ SECURITY_HEADERS = {
     "X-Content-Type-Options": "nosniff",
     "X-Frame-Options": "DENY",
 }
-_ENCODED_HEADERS = [(name.lower().encode(), value.encode()) for name, value in SECURITY_HEADERS.items()]
+ENCODED_HEADERS = [(name.lower().encode(), value.encode()) for name, value in SECURITY_HEADERS.items()]
 
 PIECE_BYTES = 1 << 16
 UNKNOWN_ROUTE = "unknown"  # one label for all paths without a route: clients could invent any number of them
@@ -192,7 +192,7 @@ class SecurityHeaders:
                 present = {name for name, _ in message["headers"]}  # the web page has its own policy
                 message["headers"] = [
                     *message["headers"],
-                    *(header for header in _ENCODED_HEADERS if header[0] not in present),
+                    *(header for header in ENCODED_HEADERS if header[0] not in present),
                 ]
             await send(message)
 

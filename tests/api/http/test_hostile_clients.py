@@ -229,6 +229,17 @@ def status_of(answer: bytes) -> int:
 HEAD = b"Host: localhost\r\nConnection: close\r\n"
 
 
+@pytest.mark.parametrize("target", [b"/jobs?a=" + b"x" * 100_000, b"/jobs\x00"])
+def test_what_is_no_request_is_refused_as_a_problem(submitting, target):
+    head, _, body = raw(submitting, b"GET " + target + b" HTTP/1.1\r\n" + HEAD + b"\r\n").partition(
+        b"\r\n\r\n"
+    )
+    assert head.startswith(b"HTTP/1.1 400 ")
+    assert b"application/problem+json" in head
+    assert b"nosniff" in head
+    assert json.loads(body)["status"] == 400
+
+
 def test_a_client_that_goes_away_in_its_body_is_no_error_of_the_server(submitting):
     head = b"Content-Type: application/json\r\nContent-Length: 9\r\n\r\n{"
     with socket.create_connection((submitting.base_url.host, submitting.base_url.port)) as connection:
