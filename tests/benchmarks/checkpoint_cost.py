@@ -20,7 +20,7 @@ from solver import Simulation
 
 TIMES = 10
 SCENES = (
-    ("doublet-shear", ("horizon=100.0", "criteria.revolutions=1000", "criteria.extensions=1.0"), 340),
+    ("doublet-shear", ("horizon=100.0", "criteria.revolutions=1000"), 340),
     ("suspension-shear", ("arrangement.count=24",), 10),
     ("suspension-shear", ("arrangement.count=256",), 2),
 )

@@ -15,18 +15,22 @@ import signal
 import sys
 import time
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import psutil
+
 from ensemble.config.checkpoint_interval import CHECKPOINT_SECONDS
+from ensemble.errors import SUSPENDED_STATUS
 from ensemble.store import Store
 from ensemble.store.checkpoint import checkpoint_path, checkpointed_keys
+from tests.api.processes import wait_until
 from tests.benchmarks.signals import Job
 from tests.solver.restarts import arrays_of
 
 INTERVAL = 0.2  # seconds between checkpoints
-HANG = "hung"
 
 
 @dataclass(frozen=True)
@@ -63,8 +67,37 @@ class Tally:
     signals: int = 0
     resumed: int = 0  # jobs that went on from a checkpoint
     done: int = 0  # runs that came to their end and were compared
-    since_checkpoint: float = 0.0  # the longest time from a checkpoint of a job to its signal, in seconds
+    since_checkpoint: float = 0.0  # the longest time from a checkpoint to a signal, in seconds
     faults: list[str] = field(default_factory=list)
+
+
+class Undisturbed:
+    """A run that nothing ends.
+
+    Parameters
+    ----------
+    directory : Path
+        New, for its store.
+    cut : Cut
+        What is run.
+
+    Attributes
+    ----------
+    bits : dict
+        All that the run holds.
+    seconds : float
+        From its first checkpoint to its end.
+    """
+
+    def __init__(self, directory: Path, cut: Cut) -> None:
+        directory.mkdir(parents=True)
+        self.cut = cut
+        job = started(cut, directory)
+        wait_until(lambda: newest_checkpoint(directory / "store") or job.launcher.poll() is not None)
+        begin = time.monotonic()
+        job.launcher.wait()
+        self.seconds = time.monotonic() - begin
+        self.bits = bits_of_only_run(directory / "store")
 
 
 class Restarts:
@@ -73,82 +106,83 @@ class Restarts:
     Parameters
     ----------
     directory : Path
-        New, for the stores.
-    cut : Cut
-        What is run.
+        New, for their store.
+    undisturbed : Undisturbed
+        What they are compared with.
     number : signal
     seed : int
         Of the moments.
     """
 
-    def __init__(self, directory: Path, cut: Cut, number: signal.Signals, seed: int) -> None:
+    def __init__(self, directory: Path, undisturbed: Undisturbed, number: signal.Signals, seed: int) -> None:
         directory.mkdir(parents=True)
-        self._cut, self._signal = cut, number
+        self._undisturbed, self._signal = undisturbed, number
         self._chance = random.Random(seed)
         self._directory, self._store = directory, directory / "store"
-        begin = time.monotonic()
-        job = self._job(directory / "undisturbed")
-        job.launcher.wait()
-        self._longest = time.monotonic() - begin
-        self._expected = self._finished(directory / "undisturbed")
         self.tally = Tally()
 
     def go_on(self) -> None:
-        """Make a job that is ended, unless it is done before."""
-        began = time.time()
-        job = self._job(self._store)
+        """Make a job that is ended at some moment after its first checkpoint, unless it is done before."""
+        earlier = newest_checkpoint(self._store)
+        job = started(self._undisturbed.cut, self._directory)
         try:
-            time.sleep(self._chance.uniform(0.1, 1.0) * self._longest)
+            wait_until(lambda: newest_checkpoint(self._store) > earlier or job.launcher.poll() is not None)
+            time.sleep(self._chance.uniform(0.0, self._undisturbed.seconds))
             in_time = job.launcher.poll() is None
             if in_time:
-                self._end(job, began)
+                self._end(job)
             if job.wait() is None:
-                self.tally.faults.append(HANG)
+                self.tally.faults.append("hung")
         finally:
             job.end()
         self.tally.signals += in_time
         self.tally.resumed += job.said.count("goes on from its checkpoint")
+        status = job.launcher.returncode
         if "Traceback" in job.said or "begins anew" in job.said:
             self.tally.faults.append(job.said)
-        status = job.launcher.returncode
-        if in_time and self._signal is signal.SIGTERM and status not in (0, 75, 143):
-            self.tally.faults.append(f"status {status}")
+        if status not in (0, SUSPENDED_STATUS) and not (in_time and self._signal is signal.SIGKILL):
+            self.tally.faults.append(f"status {status}: {job.said}")
         if status == 0:
             self._compare()
-        elif not in_time:
-            self.tally.faults.append(f"status {status}: {job.said}")
 
-    def _job(self, store: Path) -> Job:
-        arguments = [*self._cut.arguments, f"--store={store}"]
-        return Job(self._cut.ranks, arguments, self._directory, **{CHECKPOINT_SECONDS: str(INTERVAL)})
-
-    def _end(self, job: Job, began: float) -> None:
-        paths = (checkpoint_path(self._store, key) for key in checkpointed_keys(self._store))
-        kept = max((path.stat().st_mtime for path in paths), default=0.0)
-        if kept > began:
-            self.tally.since_checkpoint = max(self.tally.since_checkpoint, time.time() - kept)
+    def _end(self, job: Job) -> None:
+        since = time.time() - newest_checkpoint(self._store)
+        self.tally.since_checkpoint = max(self.tally.since_checkpoint, since)
         part = self._chance.choice(["launcher", "rank"]) if self._signal is signal.SIGKILL else "launcher"
-        victim = job.victim(part, self._chance)
-        if victim is None:
-            job.launcher.send_signal(self._signal)
-        else:
-            victim.send_signal(self._signal)
+        with suppress(psutil.NoSuchProcess):  # it has just ended
+            (job.victim(part, self._chance) or job.launcher).send_signal(self._signal)
 
     def _compare(self) -> None:
         self.tally.done += 1
-        if self._finished(self._store) != self._expected:
+        if bits_of_only_run(self._store) != self._undisturbed.bits:
             self.tally.faults.append("other bits")
         with Store.open(self._store) as store:
             (summary,) = store.summaries()
             self.tally.faults += store.check()
             store.set_aside(summary.key)
-        left = list(checkpointed_keys(self._store))
-        self.tally.faults += [f"checkpoint left: {key}" for key in left]
+        self.tally.faults += [f"checkpoint left: {key}" for key in checkpointed_keys(self._store)]
 
-    def _finished(self, path: Path) -> dict[str, Any]:
-        with Store.existing(path) as store:
-            (summary,) = store.summaries()
-            return arrays_of(store.load(summary.key))
+
+def started(cut: Cut, directory: Path) -> Job:
+    """Start a job that makes a run for the store in a directory."""
+    arguments = [*cut.arguments, f"--store={directory / 'store'}"]
+    return Job(cut.ranks, arguments, directory, **{CHECKPOINT_SECONDS: str(INTERVAL)})
+
+
+def newest_checkpoint(store: Path) -> float:
+    """Return when it was written; 0 if there is none."""
+    written = 0.0
+    for key in checkpointed_keys(store):
+        with suppress(FileNotFoundError):  # its run has just been committed
+            written = max(written, checkpoint_path(store, key).stat().st_mtime)
+    return written
+
+
+def bits_of_only_run(path: Path) -> dict[str, Any]:
+    """Return all that the only run in a store holds, but its wall time."""
+    with Store.existing(path) as store:
+        (summary,) = store.summaries()
+        return arrays_of(store.load(summary.key))
 
 
 def main() -> None:
@@ -161,13 +195,14 @@ def main() -> None:
     parser.add_argument("--minutes", type=float, default=600.0, help="after which fewer tries are enough")
     options = parser.parse_args()
     deadline = time.monotonic() + 60 * options.minutes
-    series = {
-        (name, number): Restarts(
-            options.directory / f"{place}-{number.name}", CUTS[name], number, options.seed + place
-        )
-        for place, name in enumerate(options.scenes)
-        for number in (signal.SIGKILL, signal.SIGTERM)
-    }
+    series = {}
+    for place, name in enumerate(options.scenes):
+        directory = options.directory / str(place)
+        undisturbed = Undisturbed(directory / "undisturbed", CUTS[name])
+        for number in (signal.SIGKILL, signal.SIGTERM):
+            series[name, number] = Restarts(
+                directory / number.name, undisturbed, number, options.seed + place
+            )
     for _ in range(options.tries):
         for restarts in series.values():
             if time.monotonic() < deadline:

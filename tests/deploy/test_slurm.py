@@ -12,8 +12,9 @@ from pathlib import Path
 import pytest
 
 from ensemble.store import Store
+from ensemble.store.checkpoint import checkpointed_keys
 from tests import slurm
-from tests.conftest import QUICK_STUDY, Launcher
+from tests.conftest import QUICK_STUDY, Finished, Launcher
 
 SCRIPT = Path(__file__).parents[2] / "deploy" / "bisect.slurm"
 ENSEMBLE = shlex.join([sys.executable, "-m", "ensemble"])
@@ -49,7 +50,9 @@ def wait_while_going_on(cluster: slurm.Cluster, job: str, log: Path, condition: 
         time.sleep(0.1)
 
 
-def test_a_job_that_is_told_to_end_queues_itself_again(slurm_cluster: slurm.Cluster, tmp_path: Path) -> None:
+def test_a_study_that_is_told_to_end_queues_itself_again_and_goes_on(
+    slurm_cluster: slurm.Cluster, finished_study: Finished, tmp_path: Path
+) -> None:
     store, log = tmp_path / "store", tmp_path / "log"
     job = slurm_cluster.submit(
         *("--ntasks=2", "--time=5", f"--output={log}", SCRIPT, "critical-hamaker", *QUICK_STUDY, "--json"),
@@ -60,8 +63,11 @@ def test_a_job_that_is_told_to_end_queues_itself_again(slurm_cluster: slurm.Clus
     # To the ranks and not to the script, as the signal ahead of a time limit.
     slurm_cluster.run("scancel", "--signal=TERM", job)
     slurm_cluster.wait_until_requeued(job)
-    slurm_cluster.run("scancel", job)
-    assert runs(store) >= 2
+    kept = set(checkpointed_keys(store))
+    assert kept
+    assert slurm_cluster.wait(job)["JobState"] == "COMPLETED", log.read_text(encoding="utf-8")
+    assert brackets(answer(log)) == brackets(finished_study.document)
+    assert any(f"run {key} goes on from its checkpoint" in log.read_text(encoding="utf-8") for key in kept)
 
 
 def test_a_canceled_job_does_not_queue_itself_again(slurm_cluster: slurm.Cluster, tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from ensemble.errors import SUSPENDED_STATUS
 from ensemble.store import Store
 from ensemble.store.checkpoint import checkpoint_path, checkpointed_keys
 from tests.api.processes import wait_until
-from tests.benchmarks.restarts import CUTS, Restarts
+from tests.benchmarks.restarts import CUTS, Restarts, Undisturbed
 from tests.benchmarks.signals import ALONE, Job
 from tests.conftest import ENSEMBLE, QUICK_STUDY
 
@@ -39,7 +39,8 @@ LONG = [
 def test_an_interrupted_run_ends_with_the_same_bits(
     tmp_path: Path, scene: str, number: signal.Signals
 ) -> None:
-    restarts = Restarts(tmp_path / "runs", CUTS[scene], number, seed=5)
+    undisturbed = Undisturbed(tmp_path / "undisturbed", CUTS[scene])
+    restarts = Restarts(tmp_path / "cut", undisturbed, number, seed=5)
     while not (restarts.tally.done and restarts.tally.resumed):
         restarts.go_on()
     assert restarts.tally.faults == []
