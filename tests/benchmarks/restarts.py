@@ -146,8 +146,8 @@ class Restarts:
             self._compare()
 
     def _end(self, job: Job) -> None:
-        since = time.time() - newest_checkpoint(self._store)
-        self.tally.since_checkpoint = max(self.tally.since_checkpoint, since)
+        if written := newest_checkpoint(self._store):  # else the run has just been committed
+            self.tally.since_checkpoint = max(self.tally.since_checkpoint, time.time() - written)
         part = self._chance.choice(["launcher", "rank"]) if self._signal is signal.SIGKILL else "launcher"
         with suppress(psutil.NoSuchProcess):  # it has just ended
             (job.victim(part, self._chance) or job.launcher).send_signal(self._signal)

@@ -7,6 +7,7 @@ import shlex
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -14,10 +15,10 @@ import pytest
 from ensemble.store import Store
 from ensemble.store.checkpoint import checkpointed_keys
 from tests import slurm
-from tests.conftest import QUICK_STUDY, Finished, Launcher
+from tests.benchmarks.restarts import CUTS, bits_of_only_run, newest_checkpoint
+from tests.conftest import ENSEMBLE, QUICK_STUDY, Finished, Launcher
 
 SCRIPT = Path(__file__).parents[2] / "deploy" / "bisect.slurm"
-ENSEMBLE = shlex.join([sys.executable, "-m", "ensemble"])
 
 pytestmark = pytest.mark.long  # each starts ranks that trace the quick study: 10 to 20 s of processor time
 
@@ -41,6 +42,10 @@ def runs(store: Path) -> int:
         return 0
     with Store.existing(store) as opened:
         return opened.count_runs()
+
+
+def is_newer_than(earlier: float, store: Path) -> bool:
+    return newest_checkpoint(store) > earlier
 
 
 def wait_while_going_on(cluster: slurm.Cluster, job: str, log: Path, condition: Callable[[], object]) -> None:
@@ -68,6 +73,30 @@ def test_a_study_that_is_told_to_end_queues_itself_again_and_goes_on(
     assert slurm_cluster.wait(job)["JobState"] == "COMPLETED", log.read_text(encoding="utf-8")
     assert brackets(answer(log)) == brackets(finished_study.document)
     assert any(f"run {key} goes on from its checkpoint" in log.read_text(encoding="utf-8") for key in kept)
+
+
+def test_a_run_in_several_jobs_ends_with_the_same_bits(
+    slurm_cluster: slurm.Cluster, launcher: Launcher, tmp_path: Path
+) -> None:
+    cut, log = CUTS["24 vesicles, two ranks"], tmp_path / "log"
+    arguments = [*cut.arguments[1:], "--set=horizon=4.0"]
+    undisturbed = launcher.run(2, [*ENSEMBLE, "run", *arguments, f"--store={tmp_path / 'undisturbed'}"])
+    assert undisturbed.returncode == 0, undisturbed.stderr
+    job = slurm_cluster.submit(
+        *("--ntasks=2", "--time=10", f"--output={log}", SCRIPT, *arguments),
+        ENSEMBLE_COMMAND="run",
+        ENSEMBLE_ENVIRONMENT=sys.prefix,
+        ENSEMBLE_STORE=str(tmp_path / "store"),
+        ENSEMBLE_CHECKPOINT_SECONDS="0.2",
+    )
+    for times in (1, 2):
+        earlier = newest_checkpoint(tmp_path / "store")
+        wait_while_going_on(slurm_cluster, job, log, partial(is_newer_than, earlier, tmp_path / "store"))
+        slurm_cluster.run("scancel", "--signal=TERM", job)
+        slurm_cluster.wait_until_requeued(job, times)
+    assert slurm_cluster.wait(job)["JobState"] == "COMPLETED", log.read_text(encoding="utf-8")
+    assert log.read_text(encoding="utf-8").count("goes on from its checkpoint") == 2
+    assert bits_of_only_run(tmp_path / "store") == bits_of_only_run(tmp_path / "undisturbed")
 
 
 def test_a_canceled_job_does_not_queue_itself_again(slurm_cluster: slurm.Cluster, tmp_path: Path) -> None:
@@ -98,9 +127,8 @@ def test_mpirun_within_a_job(
 def test_the_jobs_of_an_array_share_a_store(slurm_cluster: slurm.Cluster, tmp_path: Path) -> None:
     store = tmp_path / "store"
     coarse = "--set numerics.points=32 --set numerics.tolerance=1e-3 --set criteria.revolutions=1"
-    line = (
-        f"srun {ENSEMBLE} run doublet-shear {coarse} --set flow.rate=0.5$SLURM_ARRAY_TASK_ID --store {store}"
-    )
+    command = shlex.join([*ENSEMBLE, "run", "doublet-shear", f"--store={store}"])
+    line = f"srun {command} {coarse} --set flow.rate=0.5$SLURM_ARRAY_TASK_ID"
     script = slurm.write_script(tmp_path / "script", [line])
     slurm_cluster.submit("--wait", "--ntasks=1", "--array=1-4", f"--output={tmp_path}/log-%a", script)
     with Store.existing(store) as opened:
