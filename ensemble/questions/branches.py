@@ -105,14 +105,14 @@ class BranchQuestion:
         from solver.steady_states.newton import NoSteadyStateError
 
         began = clock.perf_counter()
-        with _opened(path) as store:
+        with opened(path) as store:
             key = branch_key(self.scene, self.parameter, self.to)
             if store is not None and store.branches.contains(key):
                 summary = store.branches.summary(key).in_units(self.scene.units)
                 return _FollowedBranch(summary, clock.perf_counter() - began)
             near = _end_of_run(self.scene, store)
             if isinstance(near, str):
-                return _NoAnswer(near)
+                return NoAnswer(near)
             points = near.tangent_angle.shape[1]
             limits = Limits(float("inf") if self.to is None else self.to)
             upward = limits.to > self.start
@@ -121,7 +121,7 @@ class BranchQuestion:
                     lambda value: with_points(self.scene_at(value), points), self.start, near, limits, upward
                 )
             except NoSteadyStateError as error:
-                return _NoAnswer(str(error))
+                return NoAnswer(str(error))
             summary = summary_of(self.scene, self.parameter, self.to, branch)
             if store is not None:
                 store.save_branch(summary, branch)
@@ -152,14 +152,14 @@ def steady_answer(scene: Scene, path: Path | None) -> Answer:
     from solver.steady_states.newton import NoSteadyStateError
 
     require_steady_states(scene)
-    with _opened(path) as store:
+    with opened(path) as store:
         near = _end_of_run(scene, store)
     if isinstance(near, str):
-        return _NoAnswer(near)
+        return NoAnswer(near)
     try:
         state = find_steady_state(with_points(scene, near.tangent_angle.shape[1]), near)
     except NoSteadyStateError as error:
-        return _NoAnswer(str(error))
+        return NoAnswer(str(error))
     record = SteadyRecord.of(state)
     document = record.model_dump(mode="json")
     return _SteadyAnswer(document, run_key(scene), measured_fields(record, document, scene.units))
@@ -186,14 +186,14 @@ def settled_answer(scene: Scene, path: Path | None) -> Answer:
     from solver.simulation.broken_symmetry import require_image, symmetry_breaking
 
     require_image(scene)
-    with _opened(path) as store:
-        run = _run_of(scene, store)
+    with opened(path) as store:
+        run = run_of(scene, store)
     if run.failure or run.period is None or not run.settled:
-        return _NoAnswer(f"the motion has not settled: {run.failure or run.undecided or run.outcome}")
+        return NoAnswer(f"the motion has not settled: {run.failure or run.undecided or run.outcome}")
     try:
         breaking = symmetry_breaking(run)
     except ArithmeticError as error:
-        return _NoAnswer(str(error))
+        return NoAnswer(str(error))
     record = {"outcome": run.outcome, "period": run.period} | breaking.record()
     dimensions = {"period": TIME, "growth_rate": RATE}
     measured = {
@@ -239,14 +239,36 @@ def require_steady_states(scene: Scene) -> None:
         )
 
 
-def _opened(path: Path | None) -> Any:
+def opened(path: Path | None) -> Any:
+    """Open a store, if there is to be one.
+
+    Parameters
+    ----------
+    path : Path or None
+        Its directory.
+
+    Returns
+    -------
+    context manager
+        Gives the store, or None.
+    """
     from ensemble.store import Store
 
     return nullcontext() if path is None else Store.open(path)
 
 
-def _run_of(scene: Scene, store: Store | None) -> Run:
-    """Return the run of a scene, from a store if it has it."""
+def run_of(scene: Scene, store: Store | None) -> Run:
+    """Return the run of a scene, from a store if it has it.
+
+    Parameters
+    ----------
+    scene : Scene
+    store : Store or None
+
+    Returns
+    -------
+    Run
+    """
     if store is None:
         from solver.simulation.simulate import simulate
 
@@ -263,7 +285,7 @@ def _end_of_run(scene: Scene, store: Store | None) -> Shapes | str:
     from solver.analysis.run import Outcome
     from solver.simulation.steady_scenes import Shapes
 
-    run = _run_of(scene, store)
+    run = run_of(scene, store)
     if run.outcome in (Outcome.FAILED, Outcome.SEPARATED, Outcome.TUMBLING):
         return f"the run of the scene comes to no rest: {run.failure or run.outcome}"
     center = run.frames.center[-1]
@@ -273,16 +295,24 @@ def _end_of_run(scene: Scene, store: Store | None) -> Shapes | str:
 
 
 @dataclass(frozen=True)
-class _NoAnswer(Answer):
-    """There is no steady state, for a reason."""
+class NoAnswer(Answer):
+    """There is no steady state, for a reason.
+
+    Attributes
+    ----------
+    failure : str
+        The reason.
+    """
 
     failure: str
     complete: ClassVar[bool] = False
 
     def json_document(self) -> dict[str, Any]:
+        """Return the reason."""
         return {"failure": self.failure}
 
     def table(self) -> Table:
+        """Return the reason."""
         from ensemble.display.result_tables import fields_table
 
         return fields_table(self.json_document())

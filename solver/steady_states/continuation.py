@@ -53,10 +53,13 @@ class Limits(NamedTuple):
     to : float
         The value of the parameter at which it ends; it also ends when it returns past its start.
     most_points : int
+    while_stable : bool
+        Whether it ends where the first perturbation begins to grow.
     """
 
     to: float
     most_points: int = 200
+    while_stable: bool = False
 
 
 class Family(Protocol):
@@ -168,6 +171,9 @@ class Continuation:
             folds += turned
             points.append(reached)
             if not low < reached.parameter < high:
+                break
+            if limits.while_stable and not reached.stable:
+                ended = "the state has become unstable"
                 break
         return Branch(tuple(points), tuple(folds), tuple(crossings), ended)
 

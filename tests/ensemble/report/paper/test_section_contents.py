@@ -14,13 +14,14 @@ from scipy.special import gamma
 
 from ensemble.figures import save
 from ensemble.report.paper.case import Case, StudyCase
-from ensemble.report.paper.comparison import Comparison
+from ensemble.report.paper.comparison import Comparison, Evidence
 from ensemble.report.paper.least_squares import straight_line
 from ensemble.report.paper.results import Results
 from ensemble.report.paper.section import Section, SectionContent, SectionFigure
 from ensemble.report.paper.sections import (
     SECTIONS,
     critical_hamaker,
+    laboratory,
     potential_exponents,
     sections_named,
     sheared_doublets,
@@ -258,3 +259,16 @@ def test_a_limit_is_inside_the_bracket_of_bisection_or_it_is_said_why_not(
     assert place.replace(" %", "%") in row.note
     assert row.computed == limit
     assert ("computed 0.0" in row.note) is (limit is not None)
+
+
+def test_the_closing_estimate_is_converted_as_by_hand() -> None:
+    """With R³ = 0.1·κ/(μ·rate) and W = κ/R² in units of which the estimate's are powers of ten."""
+    estimate = laboratory.ClosingEstimate(
+        rate=0.1, adhesion_energy=1e-6, bending_modulus=1e-18, viscosity=1e-3
+    )
+    found = laboratory.compare_estimate(estimate, (0.1, 0.1), 4.0, Evidence())
+    values = [row.computed for row in found]
+    assert values[0] == pytest.approx((10.0, 10.0), rel=1e-12)
+    assert values[1:] == pytest.approx(
+        [0.04, 4.0, 2.0, 0.1 * 1e-18 / (1e-3 * 8e-18), 250.0, 1.5625e-14], rel=1e-12
+    )

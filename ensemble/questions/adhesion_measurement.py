@@ -1,0 +1,358 @@
+"""The question how strong an adhesion is, from the extension rate at which a trap ends side by side."""
+
+from __future__ import annotations
+
+import math
+import time as clock
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple, Self
+
+from ensemble.config.dotted_paths import parameter_value
+from ensemble.config.measured import Measured, measured_document
+from ensemble.config.overrides import override
+from ensemble.config.validation import nearest, validated
+from ensemble.questions.branches import NoAnswer, opened, run_of
+from ensemble.questions.question import Answer
+from solver.dimensions import ADHESION_ENERGY, HAMAKER, RATE, TIME, Dimension
+from solver.scene import Scene
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from ensemble.store import Store
+    from solver.scene import PairPotential
+    from solver.simulation.steady_scenes import Shapes, SteadyBranch, SteadyPoint
+
+_HAMAKER, _RATE, _AREA = "adhesion.hamaker", "flow.rate", "vesicles.reduced_area"
+_DISTANCE = "adhesion.distance"
+_RADIUS, _MODULUS, _VISCOSITY = "units.radius", "units.bending_modulus", "units.viscosity"
+INPUTS: Final = (_RATE, _AREA, _DISTANCE, _RADIUS, _MODULUS, _VISCOSITY)
+NUMERICS: Final = "numerics"  # what the points and the search leave, beside the inputs
+
+# Where the pair is looked for first: at the fold of the preset at reduced area 0.8, and with more adhesion.
+_KNOWN_FOLD = 0.7 * 0.4 / 0.094
+_ABOVE = 1.6
+_MOST_TRIALS = 8
+_WEAKEST = 1e-3  # of the first strength
+_CHANGE = -1e-3  # relative, of an input, in differences; a reduced area cannot always rise
+_NEAR = 0.01  # relative distance from the critical strength of the state from which others are followed
+_FINER = 1.5  # times the points
+_FOUND = 1e-8  # relative accuracy with which the end of a branch is found
+_STEPS = (0.005, 0.2)  # of a plan, relative, at least and at most
+_DECAY = 3.0  # time constants of the slowest perturbation for which a rate is held
+
+
+@dataclass(frozen=True)
+class AdhesionMeasurement:
+    """How strong the adhesion of a pair is that a slowly rising extension rate has turned from side by side.
+
+    Attributes
+    ----------
+    scene : Scene
+        A pair in a trap at the critical rate that was measured.  Its Hamaker constant is not used.
+    errors : mapping of str to float
+        Relative standard errors of inputs by their dotted paths in the scene, which are in `INPUTS`.
+    """
+
+    scene: Scene
+    errors: Mapping[str, float]
+
+    def __post_init__(self) -> None:
+        flow = self.scene.imposed_flow
+        if flow is None or not flow.strains or flow.comoving or len(self.scene.vesicles) != 2:
+            raise ValueError("flow: a measurement takes a pair in a trap, at the critical rate")
+        if self.adhesion.cutoff is not None:
+            raise ValueError("adhesion.cutoff: a measurement takes a potential without it")
+        parameter_value(self.scene, _AREA)
+        for path, error in self.errors.items():
+            if path not in INPUTS:
+                similar = nearest(path, INPUTS)
+                hint = f"did you mean {similar!r}?" if similar else f"inputs: {', '.join(INPUTS)}"
+                raise ValueError(f"error: {path!r} is no input of the measurement; {hint}")
+            if path.startswith("units.") and self.scene.units is None:
+                raise ValueError(f"error: {path} — the scene has no table units")
+            if not 0 <= error < 1:
+                raise ValueError(f"error: {path}={error:g} — must be a fraction, at least 0 and less than 1")
+
+    @property
+    def adhesion(self) -> PairPotential:
+        """The potential, with a strength that is not used."""
+        if self.scene.adhesion is None:
+            raise ValueError("adhesion: a measurement needs the potential's distance")
+        return self.scene.adhesion
+
+    def answer(self, path: Path | None) -> Answer:
+        """Follow the pair that rests side by side as its adhesion weakens, to where it is lost.
+
+        Parameters
+        ----------
+        path : Path or None
+            Directory of the store that keeps the runs and the branch.
+
+        Returns
+        -------
+        Answer
+        """
+        from ensemble.search.branch_summary import branch_key
+        from ensemble.store.branch_record import summary_of
+        from solver.steady_states.newton import NoSteadyStateError
+
+        began = clock.perf_counter()
+        with opened(path) as store:
+            start = self._side_by_side(store)
+            if isinstance(start, str):
+                return NoAnswer(start)
+            scene, near = start
+            weakest = _WEAKEST * parameter_value(scene, _HAMAKER)
+            try:
+                branch = _weakened(scene, near, weakest)
+                loss = _Loss.of(branch)
+                dependence = loss.dependence()
+            except NoSteadyStateError as error:
+                return NoAnswer(str(error))
+            key = branch_key(scene, _HAMAKER, weakest)
+            if store is not None and not store.branches.contains(key):
+                store.save_branch(summary_of(scene, _HAMAKER, weakest, branch), branch)
+        return _MeasuredAdhesion(self, loss, dependence, key, clock.perf_counter() - began)
+
+    def _side_by_side(self, store: Store | None) -> tuple[Scene, Shapes] | str:
+        """Return a scene with more adhesion and its pair at rest side by side, or why there is none."""
+        from solver.analysis.run import Outcome
+        from solver.simulation.steady_scenes import Shapes
+
+        strength = _ABOVE * _KNOWN_FOLD * parameter_value(self.scene, _RATE) / self.adhesion.distance
+        for _ in range(_MOST_TRIALS):
+            scene = _changed(self.scene, {_HAMAKER: strength})
+            run = run_of(scene, store)
+            if run.outcome is Outcome.FAILED:
+                return f"with H = {strength:.4g} the run fails: {run.failure}"
+            if run.outcome is Outcome.BOUND:
+                return scene, Shapes(run.frames.tangent_angle[-1], run.frames.center[-1])
+            strength *= 2
+        return f"no adhesion up to H = {strength / 2:.4g} holds the pair side by side at this rate"
+
+
+class _Dependence(NamedTuple):
+    """How the critical strength depends on the inputs: logarithmic derivatives, without units.
+
+    Attributes
+    ----------
+    rate, area, distance : float
+        Of H by these.
+    energy : float
+        Of the energy of flat membranes over H, by the distance.
+    numerics : float
+        Relative error of H.
+    """
+
+    rate: float
+    area: float
+    distance: float
+    energy: float
+    numerics: float
+
+    def of_hamaker(self) -> dict[str, float]:
+        """Return the logarithmic derivatives of H, without units, by the inputs with theirs."""
+        return {
+            _RATE: self.rate,
+            _AREA: self.area,
+            _DISTANCE: self.distance,
+            _RADIUS: 3 * self.rate - self.distance,
+            _MODULUS: -self.rate,
+            _VISCOSITY: self.rate,
+        }
+
+    def of_energy(self) -> dict[str, float]:
+        """Return those of the energy per area, with its unit κ/R²."""
+        distance = self.distance + self.energy
+        return {
+            _RATE: self.rate,
+            _AREA: self.area,
+            _DISTANCE: distance,
+            _RADIUS: 3 * self.rate - distance - 2,
+            _MODULUS: 1 - self.rate,
+            _VISCOSITY: self.rate,
+        }
+
+
+class _Loss(NamedTuple):
+    """Where a pair that rests side by side is lost as its adhesion weakens.
+
+    Attributes
+    ----------
+    kind : str
+        Whether it is a fold or a crossing.
+    point : SteadyPoint
+    shortly_before : SteadyPoint
+        A stable state with a little more adhesion.
+    """
+
+    kind: str
+    point: SteadyPoint
+    shortly_before: SteadyPoint
+
+    @classmethod
+    def of(cls, branch: SteadyBranch) -> Self:
+        from solver.steady_states.newton import NoSteadyStateError
+
+        ends = [("fold", fold) for fold in branch.folds]
+        ends += [("crossing", crossing) for crossing in branch.crossings]
+        if branch.points[-1].state.stable or not ends:
+            raise NoSteadyStateError(f"the pair is not lost as its adhesion weakens: {branch.ended}")
+        kind, point = max(ends, key=lambda end: end[1].parameter)
+        enough = [each for each in branch.points if each.parameter > (1 + _NEAR) * point.parameter]
+        return cls(kind, point, enough[-1] if enough else branch.points[0])
+
+    def dependence(self) -> _Dependence:
+        """Find the loss again with changed inputs and with more points."""
+        from solver.membrane.resampling import resampled_angle
+        from solver.simulation.steady_scenes import Shapes
+
+        scene, shapes = self.shortly_before.state.scene, self.shortly_before.state.shapes
+        strength = parameter_value(scene, _HAMAKER)
+        points = shapes.tangent_angle.shape[1]
+
+        def change(path: str, value: float, near: Shapes = shapes) -> float:
+            """Return the relative change of the critical strength, as a logarithm."""
+            branch = _weakened(_changed(scene, {path: value}), near, strength / 2)
+            return math.log(_Loss.of(branch).point.parameter / self.point.parameter)
+
+        finer = 2 * round(_FINER * points / 2)
+        refined = Shapes(resampled_angle(shapes.tangent_angle, finer), shapes.center)
+        slopes = {
+            path: change(path, parameter_value(scene, path) * (1 + _CHANGE)) / math.log1p(_CHANGE)
+            for path in (_RATE, _AREA, _DISTANCE)
+        }
+        numerics = abs(change("numerics.points", finer, refined)) + _FOUND
+        return _Dependence(slopes[_RATE], slopes[_AREA], slopes[_DISTANCE], _energy_slope(scene), numerics)
+
+
+def _changed(scene: Scene, changes: Mapping[str, Any]) -> Scene:
+    return validated(Scene, override(scene.model_dump(), changes))
+
+
+def _weakened(scene: Scene, near: Shapes, weakest: float) -> SteadyBranch:
+    """Follow the steady state of a scene as its adhesion weakens, until it is unstable."""
+    from solver.simulation.resolution import with_points
+    from solver.simulation.steady_scenes import follow_steady_states
+    from solver.steady_states.continuation import Limits
+
+    points = near.tangent_angle.shape[1]
+    return follow_steady_states(
+        lambda strength: with_points(_changed(scene, {_HAMAKER: strength}), points),
+        parameter_value(scene, _HAMAKER),
+        near,
+        Limits(weakest, while_stable=True),
+        upward=False,
+    )
+
+
+def _energy_slope(scene: Scene) -> float:
+    """Return the logarithmic derivative of the energy of flat membranes by the distance."""
+    energies = []
+    for factor in (1 - abs(_CHANGE), 1 + abs(_CHANGE)):
+        adhesion = _changed(scene, {_DISTANCE: parameter_value(scene, _DISTANCE) * factor}).adhesion
+        assert adhesion is not None
+        energies.append(math.log(adhesion.flat_membranes.energy))
+    return (energies[1] - energies[0]) / (math.log1p(abs(_CHANGE)) - math.log1p(-abs(_CHANGE)))
+
+
+@dataclass(frozen=True)
+class _MeasuredAdhesion(Answer):
+    """An adhesion, with its error and the plan of the next experiment."""
+
+    measurement: AdhesionMeasurement
+    loss: _Loss
+    dependence: _Dependence
+    branch_key: str
+    seconds: float
+    complete: ClassVar[bool] = True
+
+    @cached_property
+    def _contributions(self) -> dict[str, float]:
+        """The relative errors of the energy that each input leaves, and the numerics."""
+        slopes, errors = self.dependence.of_energy(), self.measurement.errors
+        inputs = {path: abs(slopes[path]) * errors[path] for path in INPUTS if path in errors}
+        return inputs | {NUMERICS: self.dependence.numerics}
+
+    def _plan(self) -> dict[str, float]:
+        """Say at which rates to look: in steps whose error is no more than that of all other inputs.
+
+        A rate in the middle of a step of the width s is known with the standard error s/√12.
+        """
+        scene = self.measurement.scene
+        rate, slope = parameter_value(scene, _RATE), abs(self.dependence.rate)
+        others = math.hypot(*(self._contributions[path] for path in self._contributions if path != _RATE))
+        step = min(max(math.sqrt(12) * others / slope, _STEPS[0]), _STEPS[1])
+        reach = max(3 * self.measurement.errors.get(_RATE, 0.0), 2 * step)
+        growth = self.loss.shortly_before.state.eigenvalues[0].real
+        return {
+            "from": rate * max(1 - reach, 0.0),
+            "to": rate * (1 + reach),
+            "step": rate * step,
+            "hold": _DECAY / abs(growth),
+        }
+
+    @cached_property
+    def _fields(self) -> dict[str, Any]:
+        """The answer as JSON data."""
+        state = self.loss.point.state
+        assert state.scene.adhesion is not None
+        hamaker = self.loss.point.parameter
+        energy = hamaker * state.scene.adhesion.flat_membranes.energy
+        contributions, errors = self._contributions, self.measurement.errors
+        slopes = self.dependence.of_hamaker()
+        of_hamaker = math.hypot(
+            *(slopes[path] * error for path, error in errors.items()), self.dependence.numerics
+        )
+        return {
+            "failure": None,
+            "critical_rate": parameter_value(self.measurement.scene, _RATE),
+            "lost_at": self.loss.kind,
+            "hamaker": hamaker,
+            "hamaker_error": hamaker * of_hamaker,
+            "adhesion_energy": energy,
+            "adhesion_energy_error": energy * math.hypot(*contributions.values()),
+            "relative_errors": contributions,
+            "dominant": max(contributions, key=contributions.__getitem__),
+            "sensitivities": self.dependence.of_energy(),
+            "inclination_angle": state.inclination_angle,
+            "gap": state.gap,
+            "plan": self._plan(),
+        }
+
+    @cached_property
+    def _measured(self) -> dict[str, Measured]:
+        units, plan = self.measurement.scene.units, self._fields["plan"]
+        if units is None:
+            return {}
+        dimensions: dict[str, Dimension] = {
+            "critical_rate": RATE,
+            "hamaker": HAMAKER,
+            "hamaker_error": HAMAKER,
+            "adhesion_energy": ADHESION_ENERGY,
+            "adhesion_energy_error": ADHESION_ENERGY,
+        }
+        of_plan = {"from": RATE, "to": RATE, "step": RATE, "hold": TIME}
+        return {
+            name: Measured.of(self._fields[name], dimension, units) for name, dimension in dimensions.items()
+        } | {f"plan.{name}": Measured.of(plan[name], dimension, units) for name, dimension in of_plan.items()}
+
+    def json_document(self) -> dict[str, Any]:
+        known = {"branch_key": self.branch_key, "wall_seconds": self.seconds}
+        return self._fields | known | measured_document(self._measured)
+
+    def table(self) -> Table:
+        from ensemble.display.result_tables import fields_table
+
+        return fields_table(self._fields, self._measured)
+
+    @property
+    def footer(self) -> str:
+        return (
+            "critical is the rate at which a pair that rests side by side is lost as the rate rises slowly; "
+            f"most of the error comes from {self._fields['dominant']}"
+        )
