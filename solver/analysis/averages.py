@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.analysis.rheology import viscosity_of
 from solver.analysis.run import Outcome, Series, Viscosity
-from solver.analysis.viscosity_history import viscosity_of
 
 if TYPE_CHECKING:
     from solver.analysis.revolutions import RevolutionTracker

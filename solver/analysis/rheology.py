@@ -11,7 +11,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.analysis.run import Viscosity
+
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from solver.membrane.geometry import Geometry
     from solver.motion.equation import Motion
 
@@ -66,3 +70,23 @@ def adhesion_stress(motion: Motion) -> float:
     """
     assert motion.adhesion is not None
     return shear_stress(motion.geometry, motion.adhesion)
+
+
+def viscosity_of(parts: Mapping[str, float]) -> Viscosity:
+    """Add up the parts of an intrinsic viscosity.
+
+    Parameters
+    ----------
+    parts : mapping
+        By the names of their series.
+
+    Returns
+    -------
+    Viscosity
+    """
+    return Viscosity(
+        total=sum(parts.values()),
+        bending_tension=parts["viscosity_bending_tension"],
+        adhesion=parts.get("viscosity_adhesion"),
+        contrast=parts.get("viscosity_contrast"),
+    )

@@ -8,13 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.analysis.diagnostics import viscosity_measures
-from solver.analysis.run import Viscosity
+from solver.analysis.rheology import viscosity_of
 from solver.analysis.spline import spline_integral
 from solver.memory import Remembering
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
+    from solver.analysis.run import Viscosity
     from solver.integrators import Step
     from solver.motion.equation import EquationOfMotion
     from solver.scene import Scene
@@ -90,23 +89,3 @@ class ViscosityHistory(Remembering):
         motion = self._equation.motion(state)
         self._times.append(time)
         self._values.append([measure(motion) for measure in self._measures.values()])
-
-
-def viscosity_of(parts: Mapping[str, float]) -> Viscosity:
-    """Add up the parts of an intrinsic viscosity.
-
-    Parameters
-    ----------
-    parts : mapping
-        By the names of their series.
-
-    Returns
-    -------
-    Viscosity
-    """
-    return Viscosity(
-        total=sum(parts.values()),
-        bending_tension=parts["viscosity_bending_tension"],
-        adhesion=parts.get("viscosity_adhesion"),
-        contrast=parts.get("viscosity_contrast"),
-    )

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from solver.compilation import compiled, widest_vectors
 from solver.forces.pair_formulas import PairFormula, derivatives
-from solver.potentials.refinement import Refinement, interpolation_to, refined_points
+from solver.potentials.refinement import Refinement, interpolation_to, refined_points, selected_points
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -176,7 +176,7 @@ def _group(
     rows = refinement.rows[refinement.starts[g] : refinement.starts[g + 1]]
     sources = refined_points(points, source, factor, refinement)
     weights = np.full(sources.shape[1], spacing[source] / factor)
-    return rows, points[:, target][:, rows], sources, weights
+    return rows, selected_points(points, target, rows), sources, weights
 
 
 @compiled
@@ -316,4 +316,6 @@ def fill_hessian(
                 for j in range(size):
                     by_source[first + j] -= sign * of_row[j]
                 by_source[row] += each[k].sum()
-    hessian[1, :, 0] = hessian[0, :, 1]
+    for row in range(hessian.shape[1]):
+        for j in range(hessian.shape[3]):
+            hessian[1, row, 0, j] = hessian[0, row, 1, j]

@@ -190,7 +190,8 @@ def _conjugate_gradients(
     natural = 0.0
     for vesicle in range(count):
         natural += points * (natural_rate * weight / wavenumber[vesicle, 0]) ** 2
-    residual, direction, correction, response = np.empty((4, size))
+    residual, direction = np.empty(size), np.empty(size)
+    correction, response = np.empty(size), np.empty(size)
     forces, change = np.empty(2 * size), np.empty(2 * size)
     _stretching(imposed, tangents, derivative, residual)
     square = 0.0
@@ -198,8 +199,10 @@ def _conjugate_gradients(
         residual[i] *= weight
         square += residual[i] * residual[i]
     goal = tolerance * tolerance * max(square, natural)
-    velocity[:] = imposed
-    tension[:] = 0.0
+    for i in range(size):
+        tension[i] = 0.0
+    for i in range(2 * size):
+        velocity[i] = imposed[i]
     product, iteration = np.inf, 0
     while square > goal:
         if iteration == limit:

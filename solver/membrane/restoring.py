@@ -60,18 +60,16 @@ def shape_rates(vesicles: Sequence[Vesicle], scene: Scene) -> Array:
 
 
 @compiled
-def _multipliers(products: Array, deviations: Array) -> Array:
-    """Return Γ⁻¹ g: the solution of a symmetric positive system of three equations, by Cramer's rule."""
+def _solve(products: Array, right: Array, solution: Array) -> None:
+    """Write the solution of a symmetric positive system of three equations, by Cramer's rule."""
     a, b, c = products[0, 0], products[0, 1], products[0, 2]
     d, e, f = products[1, 1], products[1, 2], products[2, 2]
     first, second, third = d * f - e * e, c * e - b * f, b * e - c * d
     determinant = a * first + b * second + c * third
-    x, y, z = deviations[0], deviations[1], deviations[2]
-    solution = np.empty(3)
+    x, y, z = right[0], right[1], right[2]
     solution[0] = (first * x + second * y + third * z) / determinant
     solution[1] = (second * x + (a * f - c * c) * y + (b * c - a * e) * z) / determinant
     solution[2] = (third * x + (b * c - a * e) * y + (a * d - b * b) * z) / determinant
-    return solution
 
 
 @compiled
@@ -129,6 +127,7 @@ def _write_rate(
 ) -> None:
     """Write the term for all membranes, (M, N)."""
     own, about = np.empty((2, tangents.shape[2])), np.empty((2, tangents.shape[2]))
+    multipliers = np.empty(3)
     for vesicle in range(rate.shape[0]):
         for component in range(2):
             for j in range(own.shape[1]):
@@ -136,7 +135,7 @@ def _write_rate(
                 offset = points[component, vesicle, j] - centers[component, vesicle]
                 about[component, j] = offset * wavenumber[vesicle, 0]
         gradients, products = _gradients(own, about, held)
-        multipliers = _multipliers(products, _deviations(own, about, reduced_area[vesicle]))
+        _solve(products, _deviations(own, about, reduced_area[vesicle]), multipliers)
         for j in range(own.shape[1]):
             total = 0.0
             for row in range(3):
@@ -158,7 +157,8 @@ def _write_jacobian(
     points = tangents.shape[1]
     cosine, sine = tangents[0], tangents[1]
     gradients, products = _gradients(tangents, offsets, held)
-    multipliers = _multipliers(products, _deviations(tangents, offsets, reduced_area))
+    multipliers = np.empty(3)
+    _solve(products, _deviations(tangents, offsets, reduced_area), multipliers)
     # Second derivatives of the area, and the diagonal of the others.
     of_area = jacobian
     for i in range(points):
@@ -169,7 +169,7 @@ def _write_jacobian(
     by_area = np.empty((3, points))
     for k in range(3):
         sum_rows(gradients[k], of_area, by_area[k])
-    solutions, by_angle = np.empty((3, points)), np.empty(3)
+    solutions, by_angle = np.empty((points, 3)), np.empty(3)
     diagonal = np.empty(points)
     for j in range(points):
         combined = along_area = 0.0
@@ -183,7 +183,7 @@ def _write_jacobian(
         for k in range(3):
             by_angle[k] -= multipliers[0] * by_area[k, j] - gradients[k, j] * diagonal[j]
             by_angle[k] /= points
-        solutions[:, j] = _multipliers(products, by_angle)
+        _solve(products, by_angle, solutions[j])
     for i in range(points):
         row = jacobian[i]
         for j in range(points):
@@ -191,7 +191,7 @@ def _write_jacobian(
         row[i] -= diagonal[i]
         for k in range(3):
             for j in range(points):
-                row[j] += gradients[k, i] * solutions[k, j]
+                row[j] += gradients[k, i] * solutions[j, k]
     for k in range(held.shape[1]):
         share = by_area[0]
         sum_rows(held[:, k], jacobian, share)

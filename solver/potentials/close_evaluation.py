@@ -26,7 +26,13 @@ from numpy.typing import NDArray
 from solver.compilation import compiled
 from solver.membrane.spectral import equispaced_angles, logarithm_weights
 from solver.potentials.logarithm import logarithm
-from solver.potentials.refinement import LARGEST_REFINED, Refinement, interpolation_to, refined_points
+from solver.potentials.refinement import (
+    LARGEST_REFINED,
+    Refinement,
+    interpolation_to,
+    refined_points,
+    selected_points,
+)
 from solver.potentials.stokeslets import stokeslets
 
 Array = NDArray[np.float64]
@@ -289,12 +295,13 @@ def refine_single_layer(points: Array, refinement: Refinement, components: Array
         rows = refinement.rows[refinement.starts[g] : refinement.starts[g + 1]]
         fine = refined_points(points, source, factor, refinement)
         refined = np.empty((3, rows.size, fine.shape[1]))
-        stokeslets(points[:, target][:, rows], fine, refined)
+        stokeslets(selected_points(points, target, rows), fine, refined)
         for component in range(3):
             folded = np.dot(refined[component], interpolation_to(refinement, factor))
             for k in range(rows.size):
                 row = target * n + rows[k] - first
-                components[component, row, source * n : (source + 1) * n] = folded[k] / factor
+                for j in range(n):
+                    components[component, row, source * n + j] = folded[k, j] / factor
 
 
 @compiled
@@ -331,7 +338,7 @@ def close_single_layer(
         rows = refinement.rows[refinement.starts[g] : refinement.starts[g + 1]]
         close = np.empty((3, rows.size, n))
         close_stokeslets(
-            points[:, target][:, rows],
+            selected_points(points, target, rows),
             np.ascontiguousarray(points[:, source]),
             np.ascontiguousarray(tangents[:, source]),
             spacing[source],
@@ -339,5 +346,8 @@ def close_single_layer(
             differentiation,
             close,
         )
-        for k in range(rows.size):
-            components[:, target * n + rows[k] - first, source * n : (source + 1) * n] = close[:, k]
+        for component in range(3):
+            for k in range(rows.size):
+                for j in range(n):
+                    row = target * n + rows[k] - first
+                    components[component, row, source * n + j] = close[component, k, j]

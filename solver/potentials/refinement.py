@@ -216,3 +216,26 @@ def refined_points(points: Array, source: int, factor: int, refinement: Refineme
     """
     coarse = np.ascontiguousarray(points[:, source])
     return coarse if factor == 1 else np.dot(coarse, interpolation_to(refinement, factor).T)
+
+
+@compiled
+def selected_points(points: Array, curve: int, rows: Indices) -> Array:
+    """Return some of the points of one curve.
+
+    Parameters
+    ----------
+    points : (2, C, n)
+        Of all curves.
+    curve : int
+        Number of the curve.
+    rows : (k,)
+        Which of its points.
+
+    Returns
+    -------
+    (2, k)
+    """
+    selected = np.empty((2, rows.size))
+    for k in range(rows.size):
+        selected[0, k], selected[1, k] = points[0, curve, rows[k]], points[1, curve, rows[k]]
+    return selected
