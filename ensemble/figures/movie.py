@@ -7,7 +7,6 @@ from pathlib import Path
 from subprocess import CalledProcessError
 from typing import Any, Final, NamedTuple
 
-import imageio_ffmpeg
 import matplotlib
 import numpy as np
 from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
@@ -55,11 +54,12 @@ class _Format(NamedTuple):
     options: dict[str, Any]
     rate: int  # pictures per second
     resolution: int  # dots per inch
+    needs_encoder: bool
 
 
 _FORMATS: Final = {
-    ".mp4": _Format(FFMpegWriter, {"codec": "h264", "extra_args": ["-crf", "18"]}, 30, 160),
-    ".gif": _Format(PillowWriter, {}, 20, 80),
+    ".mp4": _Format(FFMpegWriter, {"codec": "h264", "extra_args": ["-crf", "18"]}, 30, 160, True),
+    ".gif": _Format(PillowWriter, {}, 20, 80, False),
 }
 MOVIE_SUFFIXES: Final = tuple(_FORMATS)
 
@@ -79,13 +79,13 @@ def save_movie(run: Run, path: Path) -> None:
     Raises
     ------
     ValueError
-        If the run has no finite state.
+        If the run has no finite state, or ``.mp4`` is asked for without the extra ``movies``.
     EnsembleError
         If the file cannot be written; it says what the encoder said.
     """
     form = _FORMATS[path.suffix.lower()]
     # The encoder of the package imageio-ffmpeg, whether or not the machine has one.
-    encoder = matplotlib.RcParams({"animation.ffmpeg_path": imageio_ffmpeg.get_ffmpeg_exe()})
+    encoder = matplotlib.RcParams({"animation.ffmpeg_path": _encoder()} if form.needs_encoder else {})
     with matplotlib.rc_context(STYLE), matplotlib.rc_context(encoder), replacing(path) as unfinished:
         picture = Picture(run, form.resolution)
         writer = form.writer(fps=form.rate, **form.options)
@@ -119,6 +119,17 @@ def picture_times(frames: Frames, rate: int) -> Array:
     duration = np.clip((last - first) / _PACE, *_DURATION) if last > first else 0.0
     moving = np.linspace(first, last, round(rate * duration) + 1)
     return np.append(moving, np.full(round(rate * _HOLD), last))
+
+
+def _encoder() -> str:
+    """Return the encoder, which weighs more than the rest of an installation: it is an extra."""
+    try:
+        import imageio_ffmpeg
+    except ImportError:
+        raise ValueError(
+            "output: .mp4 needs the extra movies, pip install 'vesicle-ensemble[movies]'; .gif does not"
+        ) from None
+    return str(imageio_ffmpeg.get_ffmpeg_exe())
 
 
 class Picture:

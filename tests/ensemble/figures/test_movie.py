@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -168,3 +169,14 @@ def test_the_arrows_are_the_flow_relative_to_the_mean_of_the_vesicles() -> None:
     assert np.ptp(y) > 1
     assert not np.any(arrows.V)
     np.testing.assert_allclose(arrows.U / np.abs(arrows.U).max(), y / np.abs(y).max(), atol=1e-12)
+
+
+def test_without_the_extra_an_mp4_is_refused_and_a_gif_is_made(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)  # as if it were not installed
+    run = few_frames(orbit(), 2)
+    with pytest.raises(ValueError, match=r"the extra movies, pip install 'vesicle-ensemble\[movies\]'"):
+        save_movie(run, tmp_path / "run.mp4")
+    save_movie(run, tmp_path / "run.gif")
+    assert [path.name for path in tmp_path.iterdir()] == ["run.gif"]
