@@ -54,13 +54,13 @@ def end_with_one_line() -> None:
 
 
 def let_answer_stand() -> None:
-    """Ignore signals from now on, if this process is alone: its work is done and its answer is given.
+    """Ignore signals from now on: the work of this process is done and its answer is given.
 
-    The interpreter still has to end; a signal meanwhile would turn success into a failure.
+    The interpreter and MPI still have to end; a signal meanwhile would turn success into a failure.  A rank
+    that waits there for one that has died is killed by the launcher.
     """
-    if launched_size() == 1:
-        for number in SIGNALS:
-            signal.signal(number, signal.SIG_IGN)
+    for number in SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
 
 
 def end_with_launcher() -> None:
