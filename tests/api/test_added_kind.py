@@ -78,6 +78,7 @@ def test_the_command_line_answers_it(launcher, tmp_path):
     assert json.loads(schema.stdout)["required"] == ["scene", "parameter", "values"]
 
 
+@pytest.mark.long
 def test_the_service_answers_it(store):
     with service(store, "--workers=1") as started, Client(started.url) as client:
         offered = client.get("/kinds").json()["items"]

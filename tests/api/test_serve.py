@@ -43,6 +43,7 @@ def simulating(family: list[psutil.Process]) -> list[psutil.Process]:
     return [process for process in family if "bisect" in process.cmdline()]
 
 
+@pytest.mark.long
 def test_a_study_is_traced_and_its_boundary_is_stored(ensemble, store):
     with service(store) as server, httpx2.Client(base_url=server.url, timeout=SECONDS) as client:
         assert "There are no tokens" in server.logged()

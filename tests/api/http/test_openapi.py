@@ -51,6 +51,8 @@ def test_every_route_is_described(paths):
         ("get", "/boundaries/{key}"),
         ("get", "/boundaries/{key}/at"),
         ("get", "/presets"),
+        ("get", "/reports"),
+        ("get", "/reports/{name}"),
         ("get", "/metrics"),
         ("get", "/healthz"),
         ("get", "/readyz"),

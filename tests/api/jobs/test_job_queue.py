@@ -76,7 +76,7 @@ def leased(jobs: Jobs, worker: str = "worker") -> Lease:
 
 def test_a_preset_becomes_the_study_or_the_scene_of_the_command_line():
     study = preset_question("critical-hamaker", {"search.tolerance": 0.1})
-    assert (study.kind, study.name) == ("study", "critical-hamaker")
+    assert (study.kind, study.name) == ("study", "critical-hamaker, search.tolerance=0.1")
     assert study.document == load_study("critical-hamaker", ["search.tolerance=0.1"])
     assert study.key == load_study("critical-hamaker", ["search.tolerance=0.1"]).key
     scene = preset_question("doublet-shear", {"flow.rate": 0.7})

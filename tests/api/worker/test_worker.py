@@ -205,10 +205,8 @@ VICTIMS: dict[str, Callable[[Family], psutil.Process]] = {
 }
 
 
-@pytest.mark.parametrize(
-    "victim",
-    ["worker", *(pytest.param(name, marks=pytest.mark.long) for name in VICTIMS if name != "worker")],
-)
+@pytest.mark.long
+@pytest.mark.parametrize("victim", VICTIMS)
 def test_a_kill_leaves_no_process_loses_no_job_and_repeats_no_run(jobs, store, victim):
     job = submit(jobs, STUDY, ranks=2)
     with working(store) as family:

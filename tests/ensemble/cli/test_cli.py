@@ -203,7 +203,7 @@ def test_a_run_that_the_store_has_is_not_made_again(ensemble, stored_run):
     assert json.loads(again.stdout) == document, "to the last bit of the time that it took"
 
 
-@pytest.mark.parametrize("command", ["run", "bisect"])
+@pytest.mark.parametrize("command", ["run", pytest.param("bisect", marks=pytest.mark.long)])
 def test_a_program_reads_progress_in_lines_of_json(ensemble, bisect_command, tmp_path, command):
     study = bisect_command(tmp_path / "store")[3:]
     arguments = study if command == "bisect" else ["run", *QUICK_SCENE, "--no-store", "--json"]

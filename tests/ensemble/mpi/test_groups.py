@@ -104,6 +104,7 @@ def test_groups_find_the_brackets_of_single_ranks_to_the_last_bit(launcher, tmp_
         assert opened.check() == []
 
 
+@pytest.mark.long
 def test_all_ranks_of_a_launcher_make_one_run_together_and_keep_it_once(launcher, tmp_path):
     scene = [*COARSE, "--set=horizon=1.0", "--json"]
     command = [*ENSEMBLE, "run", "doublet-shear", *scene]

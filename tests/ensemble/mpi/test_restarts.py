@@ -22,9 +22,8 @@ from tests.conftest import ENSEMBLE, QUICK_STUDY
 
 pytestmark = pytest.mark.usefixtures("finished_study")  # the kernels are compiled
 
-# One of each signal in the first tier.
-SHORT = [("doublet in shear", signal.SIGTERM)]
-LONG = [
+CUT = [
+    ("doublet in shear", signal.SIGTERM),
     ("doublet in shear", signal.SIGKILL),
     ("trap, relaxed start", signal.SIGTERM),
     ("trap, relaxed start", signal.SIGKILL),
@@ -33,9 +32,8 @@ LONG = [
 ]
 
 
-@pytest.mark.parametrize(
-    ("scene", "number"), [*SHORT, *(pytest.param(*case, marks=pytest.mark.long) for case in LONG)]
-)
+@pytest.mark.long
+@pytest.mark.parametrize(("scene", "number"), CUT)
 def test_an_interrupted_run_ends_with_the_same_bits(
     tmp_path: Path, scene: str, number: signal.Signals
 ) -> None:

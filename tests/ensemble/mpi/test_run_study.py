@@ -33,7 +33,8 @@ def made(store: Path) -> dict[str, str]:
         return {summary.key: summary.created.isoformat() for summary in opened.summaries()}
 
 
-@pytest.mark.parametrize("ranks", [pytest.param(1, marks=pytest.mark.long), 3])
+@pytest.mark.long
+@pytest.mark.parametrize("ranks", [1, 3])
 def test_any_number_of_ranks_finds_the_same_brackets(
     launcher, bisect_command, finished_study, tmp_path, ranks
 ):

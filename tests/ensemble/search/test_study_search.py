@@ -27,6 +27,7 @@ def test_sides_of_outcomes() -> None:
         Outcome.EQUILIBRIUM: Side.UNDECIDED,
         Outcome.STEADY: Side.UNDECIDED,
         Outcome.TUMBLING: Side.UNDECIDED,
+        Outcome.COMPLETED: Side.UNDECIDED,
     }
     trap = load_study("critical-extension-rate")
     assert side_of(trap, Outcome.BOUND) is Side.LOW

@@ -153,7 +153,7 @@ def test_a_new_potential_runs(scene: Scene, cutoff: float | None) -> None:
     assert scene.adhesion == Morse(**COMMON, steepness=3.0, cutoff=cutoff)
     assert Scene.model_validate_json(scene.model_dump_json()) == scene
     run = simulate(scene)
-    assert run.outcome is Outcome.UNDECIDED
+    assert run.outcome in {Outcome.UNDECIDED, Outcome.COMPLETED}
     assert run.energy.adhesion is not None
     assert run.energy.adhesion < 0
     without = simulate(scene.model_copy(update={"adhesion": None}))
