@@ -67,8 +67,8 @@ def override(document: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[st
     """Return a copy of a document with the values at some dotted paths replaced.
 
     Tables that do not exist yet are added.  Whether the document may contain them is decided later, when its
-    model validates it.  A document that has a name is then called after it and the changes, so that no two
-    share a name that differ.
+    model validates it.  A document that has a name is then called after it and the changes, as far as they
+    fit; units change nothing, so they are not among them.
 
     Parameters
     ----------
@@ -107,8 +107,8 @@ def override(document: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[st
 def _name_with_changes(document: Mapping[str, Any], changes: Mapping[str, Any]) -> str:
     made = (
         f"{path}={json.dumps(value, default=str)}"
-        for path, value in changes.items()
-        if not _has(document, path, value)
+        for path, value in sorted(changes.items())
+        if not _has(document, path, value) and "units" not in path.split(".")
     )
     name = ", ".join((document["name"], *made))
     return name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 1]}…"

@@ -182,7 +182,7 @@ class StudyQuestion(Question[Study]):
         store : Store
             An open store.
         name : str
-            The name of the study, its key, or the beginning of one of them that no other has.
+            The name of the study, with or without its changes, or the beginning of its key.
 
         Returns
         -------

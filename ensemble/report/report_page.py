@@ -73,6 +73,7 @@ def report_page(text: str, directory: Path) -> str:
     str
         The page.
     """
+    # Reports fold the sources of a table away, which Markdown can say as HTML only.
     markdown = MarkdownIt("commonmark").enable("table")
     tokens = markdown.parse(text)
     headings = [

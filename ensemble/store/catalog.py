@@ -239,22 +239,23 @@ class Catalog:
         return self._one(_ONE_BOUNDARY, study_key)
 
     def boundaries_named(self, name: str) -> list[Record]:
-        """Return the boundaries of a name, or else those whose name or key begins so; the latest change last.
+        """Return the boundaries of a name, or else those of its changed studies, or whose key begins so.
 
         Parameters
         ----------
         name : str
-            Name of the study, its key, or the first characters of one of them.
+            Name of the study, with or without its changes, or the first characters of its key.
 
         Returns
         -------
         list of Record
+            The latest change last.
         """
         by_change = _BOUNDARY.order_by(BoundaryRow.updated, BoundaryRow.study_key)
         has_name = BoundaryRow.document["name"].as_string() == name
         begins_so = or_(
             BoundaryRow.study_key.startswith(name, autoescape=True),
-            BoundaryRow.document["name"].as_string().startswith(name, autoescape=True),
+            BoundaryRow.document["name"].as_string().startswith(f"{name}, ", autoescape=True),
         )
         return self._all(by_change.where(has_name)) or self._all(by_change.where(begins_so))
 

@@ -568,16 +568,17 @@ class Store(AbstractContextManager["Store"]):
         return list(readable(Boundary, "boundary", self._catalog.boundaries(listing)))
 
     def boundaries_named(self, name: str) -> list[Boundary]:
-        """Return the boundaries of a name, or else those whose name or key begins so; the latest change last.
+        """Return the boundaries of a name, or else those of its changed studies, or whose key begins so.
 
         Parameters
         ----------
         name : str
-            Name of the study, its key, or the first characters of one of them.
+            Name of the study, with or without its changes, or the first characters of its key.
 
         Returns
         -------
         list of Boundary
+            The latest change last.
         """
         return list(readable(Boundary, "boundary", self._catalog.boundaries_named(name)))
 

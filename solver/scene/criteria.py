@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationInfo, model_validator
 
 from solver.dimensions import LENGTH, RATE, TIME
 from solver.model import Model, Positive
@@ -41,8 +41,16 @@ class Criteria(Model):
 
     @model_validator(mode="before")
     @classmethod
-    def _without_former_fields(cls, fields: Any) -> Any:
-        """Leave out what runs stored by earlier versions have."""
-        if isinstance(fields, dict):
-            return {name: value for name, value in fields.items() if name not in _FORMER}
-        return fields
+    def _without_former_fields(cls, fields: Any, info: ValidationInfo) -> Any:
+        """Leave out what runs stored by earlier versions have.
+
+        A document that is given now has a context.  There such a field is refused: without it the run would
+        be another one.
+        """
+        if not isinstance(fields, dict):
+            return fields
+        if info.context is not None and "extensions" in fields:
+            raise ValueError(
+                "extensions is gone: horizon is the latest time of a run, so multiply it instead"
+            )
+        return {name: value for name, value in fields.items() if name not in _FORMER}

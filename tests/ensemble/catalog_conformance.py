@@ -239,9 +239,18 @@ class CatalogConformance:
         assert found("50% of _all_") == ["abc"]
         assert found("ab") == ["abd", "abc"]
         assert found("abc") == ["abc"]
-        assert found("crit") == ["ac", "abd"]
-        assert found("50%") == ["abc"]
-        assert found("%") == found("_b") == found("50_") == []
+        assert found("%") == found("_b") == found("crit") == []
+
+    def test_changed_studies_are_found_by_the_name_without_the_changes(self, store: Store) -> None:
+        for study_key, name in {
+            "abc": "a_b, x=1",
+            "abd": "a_b, y=2",
+            "abe": "a_b-c",
+            "abf": "axb, z=3",
+        }.items():
+            made = boundary(study_key, 0.1, None, NOON)
+            store.save_boundary(made.model_copy(update={"name": name}))
+        assert [each.study_key for each in store.boundaries_named("a_b")] == ["abc", "abd"]
 
     def test_pages_of_boundaries_are_in_the_order_of_their_keys(self, store: Store) -> None:
         for study_key in "cab":

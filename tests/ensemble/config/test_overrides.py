@@ -154,7 +154,9 @@ def test_an_unknown_kind_of_flow_is_told_the_known_ones() -> None:
         ({}, "mine"),
         ({"scene.horizon": 20.0}, "mine, scene.horizon=20.0"),
         ({"scene.horizon": 20.0, "sweep.values": [0.5]}, "mine, scene.horizon=20.0, sweep.values=[0.5]"),
+        ({"sweep.values": [0.5], "scene.horizon": 20.0}, "mine, scene.horizon=20.0, sweep.values=[0.5]"),
         ({"scene.horizon": 10.0}, "mine"),  # as it was
+        ({"scene.units.radius": "10 um"}, "mine"),
         ({"scene.flow.kind": "trap"}, 'mine, scene.flow.kind="trap"'),
         ({"name": "yours", "scene.horizon": 20.0}, "yours"),
         ({"scene.note": "x" * 200}, 'mine, scene.note="' + "x" * 81 + "…"),

@@ -140,6 +140,15 @@ def test_the_key_is_the_same_in_another_process() -> None:
     assert other.stdout.strip() == HAMAKER.key
 
 
+def test_a_field_that_is_gone_is_refused_where_it_is_given_and_read_where_it_is_stored() -> None:
+    with pytest.raises(ValueError, match="extensions is gone: horizon is the latest time of a run"):
+        load_scene("doublet-shear", ["criteria.extensions=4.0"])
+    scene = load_scene("doublet-shear")
+    stored = scene.model_dump(mode="json")
+    stored["criteria"] |= {"extensions": 4.0, "gap_growth": 0.1}
+    assert Scene.model_validate(stored) == scene
+
+
 def test_tolerance_and_overrides_reach_the_study() -> None:
     study = load_study("critical-hamaker", ["scene.vesicles.reduced_area=0.8", "search.tolerance=0.05"])
     assert study.search.tolerance == 0.05
