@@ -60,14 +60,17 @@ class CheckpointKeeper:
         self._next_look = 0.0
         self._next_checkpoint = time.monotonic() + self._interval
         self._trouble: str | None = None
+        self._was_kept = False  # before this command
 
     def read(self) -> Saved | None:
         """Return the state to go on from; None, with a line that says why, if there is none of use."""
         try:
-            return self._checkpoint.read()
+            saved = self._checkpoint.read()
         except StoreError as error:
             self.begin_anew(str(error))
             return None
+        self._was_kept = saved is not None
+        return saved
 
     def begin_anew(self, reason: str) -> None:
         """Say why the run does not go on from its checkpoint.
@@ -87,7 +90,7 @@ class CheckpointKeeper:
         order = self._order()
         if order is Order.GO_ON and now >= self._next_checkpoint:
             return Order.KEEP
-        if order is Order.CANCEL:
+        if order is Order.CANCEL and not self._was_kept:  # that of another command is not this one's to drop
             self._checkpoint.remove()
         return order
 

@@ -2,7 +2,8 @@
 
 It is one file, `checkpoints/KEY.h5` in the store, that holds what `solver.Simulation.saved` returns.  It is
 written to the directory of its writer in `staging/`, flushed and renamed, so that it is whole or the one
-before.  It is removed when its run is committed, or when the run is canceled because nobody needs it.
+before.  It is removed when its run is committed.  A run that is canceled because nobody needs it removes its
+own one, and leaves one that it has gone on from.
 """
 
 from __future__ import annotations
