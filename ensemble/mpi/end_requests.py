@@ -18,8 +18,8 @@ _REQUESTS = 3  # tag of messages to the first rank
 class EndRequests(AbstractContextManager["EndRequests"]):
     """Takes requests to end, within a block.
 
-    Only the first rank learns of them, because it decides for all.  Entering and leaving is collective, but
-    for errors.
+    Only the first rank learns of them, because it decides for all.  A request holds for the rest of the
+    process: each later block has it from the start.  Entering and leaving is collective, but for errors.
 
     Parameters
     ----------
@@ -28,13 +28,15 @@ class EndRequests(AbstractContextManager["EndRequests"]):
     """
 
     _current: ClassVar[EndRequests | None] = None
+    _signaled: ClassVar[bool] = False  # this process has accepted a request
+    _told: ClassVar[bool] = False
+    # A signal handler runs in the main thread, which may be the one that holds the lock.
+    _lock: ClassVar[threading.RLock] = threading.RLock()
 
     def __init__(self, communicator: Intracomm | None) -> None:
         self._communicator = communicator
         self._rank = 0 if communicator is None else communicator.Get_rank()
-        # A signal handler runs in the main thread, which may be the one that holds the lock.
-        self._lock = threading.RLock()
-        self._signaled = self._asked = self._leaves = False
+        self._asked = self._leaves = False
         self._sent: Request | None = None
         self._received = 0
 
@@ -50,6 +52,16 @@ class EndRequests(AbstractContextManager["EndRequests"]):
         current = cls._current
         return current is not None and current._take()
 
+    @classmethod
+    def accepted(cls) -> bool:
+        """Tell whether this process has accepted a request.
+
+        Returns
+        -------
+        bool
+        """
+        return cls._signaled
+
     @property
     def arrived(self) -> bool:
         """Whether the job has been asked to end; to be read on the first rank."""
@@ -58,8 +70,13 @@ class EndRequests(AbstractContextManager["EndRequests"]):
         return self._asked
 
     def __enter__(self) -> EndRequests:
-        """Take requests from now on."""
+        """Take requests from now on, and learn of those that earlier blocks have accepted."""
+        earlier = EndRequests._signaled
         EndRequests._current = self
+        if self._communicator is not None:
+            earlier = any(self._communicator.allgather(earlier))
+        if earlier and self._rank == 0:
+            self._note()
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
@@ -77,9 +94,9 @@ class EndRequests(AbstractContextManager["EndRequests"]):
     def _take(self) -> bool:
         with self._lock:
             # A launcher signals all ranks: the message of another one may have come before.
-            if self._signaled:
+            if EndRequests._signaled:
                 return False
-            self._signaled = True
+            EndRequests._signaled = True
             if self._leaves:  # the work is done, or suspended already
                 return True
             if self._communicator is not None and self._rank > 0:
@@ -98,6 +115,9 @@ class EndRequests(AbstractContextManager["EndRequests"]):
 
     def _note(self) -> None:
         """Note on the first rank that the job is asked to end, and say so once."""
-        if not self._asked and not self._leaves:
-            self._asked = True
+        if self._leaves:
+            return
+        self._asked = True
+        if not EndRequests._told:
+            EndRequests._told = True
             tell("ends after the next step of its runs; the same command goes on (a second signal: at once)")

@@ -18,6 +18,7 @@ from ensemble.config.measured import Measured, measured_document, measured_field
 from ensemble.config.overrides import override
 from ensemble.config.run_key import run_key
 from ensemble.config.validation import validated
+from ensemble.errors import SUSPENDED_STATUS, Interrupted
 from ensemble.questions.question import Answer, StoredAnswer, StoredAnswers
 from solver.dimensions import RATE, TIME
 from solver.scene import LARGEST_DENSE, Scene, Units
@@ -274,9 +275,12 @@ def run_of(scene: Scene, store: Store | None) -> Run:
 
         return simulate(scene)
 
+    from ensemble.mpi.end_requests import EndRequests
     from ensemble.mpi.single_run import single_run
 
     single_run(None, scene, store, 1, lambda *_: None)
+    if EndRequests.accepted():  # the run was done with its last step, and what follows cannot be stopped
+        raise Interrupted(SUSPENDED_STATUS)
     return store.load(run_key(scene))
 
 
