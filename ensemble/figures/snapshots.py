@@ -103,15 +103,15 @@ def _beside_each_other(axes: Axes, reach: Array, times: Array) -> Array:
 
 
 def _below_each_other(axes: Axes, reach: Array, times: Array) -> Array:
-    """Arrange snapshots in a column with their times at the left; return their centers, (snapshots, 2)."""
+    """Arrange snapshots in a column with their times left of it; return their centers, (snapshots, 2)."""
     side = reach[:, 0].max()
     tight = reach[:, 1] + _SPACE / 2
     half_height = np.maximum(tight, 0.04 * side)
     middle = half_height - np.cumsum(2 * half_height)
     for y, half in list(zip(middle, half_height, strict=True))[1::2]:
         axes.axhspan(y - half, y + half, color=PALE, linewidth=0, zorder=0)
-    for y, half, time in zip(middle, half_height, times, strict=True):
-        axes.annotate(_time(time), (-side, y + half), (0, -3), textcoords="offset points", va="top")
+    for y, time in zip(middle, times, strict=True):
+        axes.annotate(_time(time), (-side, y), (-6, 0), textcoords="offset points", ha="right", va="center")
     axes.set(xlim=(-side - 0.1, side + 0.1), ylim=(-2 * half_height.sum(), 0))
     return np.stack([np.zeros_like(middle), middle], axis=1)
 
