@@ -12,6 +12,7 @@ import logging
 import signal
 import threading
 import time
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Concatenate, ParamSpec
@@ -81,6 +82,7 @@ class Worker:
         self._memory = memory
         self._identity = own_identity()
         self._has_seen_outage = False  # during the present attempt
+        self._futile: Counter[str] = Counter()  # attempts here since a job last came further, by its id
 
     def run(self, stop: threading.Event) -> None:
         """Work until an event is set; a job that is not finished by then is given back.
@@ -117,6 +119,7 @@ class Worker:
         try:
             command = mpirun_command(job.ranks, self._memory // job.ranks, self._arguments(lease))
         except OSError as error:
+            self._futile[job.id] += 1
             self._try_again_later(lease, stop, f"could not be started ({error.strerror})")
             return
         with Process(command, self._log(lease)) as process:
@@ -127,10 +130,14 @@ class Worker:
             if result is not None:
                 self._finish(lease, stop, result)
                 return
+        reached = lease.at(process.progress.reached)
+        self._futile[job.id] = self._futile[job.id] + 1 if reached is lease else 0
         if status == SUSPENDED_STATUS:
-            self._record(stop, self._jobs.give_back, lease.at(process.progress.reached), _SUSPENDED)
+            waits = self._futile[job.id] > 0 and not stop.is_set()
+            seconds = self._delay(reached) if waits else 0.0
+            self._record(stop, self._jobs.give_back, reached, _SUSPENDED, seconds)
             return
-        self._try_again_later(lease.at(process.progress.reached), stop, f"ended {_in_words(status)}")
+        self._try_again_later(reached, stop, f"ended {_in_words(status)}")
 
     def _wait(self, process: Process, lease: Lease, stop: threading.Event) -> int | None:
         """Wait for the end of an attempt and return its exit status; None if it has to be ended before."""
@@ -185,11 +192,15 @@ class Worker:
             self._log(lease).add(f"attempt {number} {what}; given up")
             self._give_up(lease, stop)
             return
-        seconds = growing_delay(max(lease.crashes, 1), LONGEST_DELAY)
+        seconds = self._delay(lease)
         message = f"attempt {number} {what}; tried again after {seconds:.1f} s"
         log.warning("job %s: %s", lease.job.id, message)
         self._log(lease).add(message)
         self._record(stop, self._jobs.give_back, lease, message, seconds)
+
+    def _delay(self, lease: Lease) -> float:
+        """Return how long a job waits that may never come further, whatever has ended its attempts."""
+        return growing_delay(max(self._futile[lease.job.id], lease.crashes, 1), LONGEST_DELAY)
 
     def _give_up(self, lease: Lease, stop: threading.Event) -> None:
         message = f"given up: {lease.crashes} attempts ended at the same point: {self._log(lease).end()}"
@@ -209,6 +220,7 @@ class Worker:
         return JobLog(self._jobs.log_path(lease.job))
 
     def _finish(self, lease: Lease, stop: threading.Event, result: JobResult) -> None:
+        del self._futile[lease.job.id]
         if self._record(stop, self._jobs.finish, lease, result.status, result.message):
             log.info("job %s: %s, %s", lease.job.id, result.status, result.message)
 

@@ -318,10 +318,22 @@ def test_what_is_no_answer_is_tried_again(jobs, worker, command, monkeypatch, cr
     assert all(2.0**number / 2 <= seconds <= 2.0**number for number, seconds in enumerate(waited))
 
 
-def test_a_job_that_was_asked_to_end_is_given_back_at_once_and_never_given_up(jobs, worker, command):
+PROGRESS = (
+    "n=$(cat %s || echo 0); n=$((n + 1)); echo $n >%s;"
+    ' echo "{\\"fraction\\": 0.5, \\"message\\": \\"half\\", \\"reached\\": $n}" >&2; exit 75'
+)
+
+
+@pytest.mark.parametrize("advances", [True, False])
+def test_a_job_that_was_asked_to_end_is_never_given_up_and_waits_if_it_came_no_further(
+    jobs, worker, command, monkeypatch, tmp_path, advances
+):
     works, stop = worker
+    waited: list[int] = []
+    monkeypatch.setattr("api.worker.worker.growing_delay", lambda tries, _: waited.append(tries) or 1e-3)
     job = submit(jobs, QUICK_SCENE)
-    command("exit 75")
+    count = tmp_path / "count"
+    command(PROGRESS % (count, count) if advances else "exit 75")
     thread = threading.Thread(target=works.run, args=(stop,))
     thread.start()
     try:
@@ -332,6 +344,8 @@ def test_a_job_that_was_asked_to_end_is_given_back_at_once_and_never_given_up(jo
         stop.set()
         thread.join()
     assert jobs.get(job.id).message == "underflow"
+    attempts = jobs.get(job.id).attempts
+    assert waited == ([] if advances else list(range(1, attempts)))
 
 
 def test_a_job_that_always_crashes_fails_with_the_end_of_its_log(jobs, worker, command, monkeypatch):
@@ -355,7 +369,8 @@ def test_a_job_that_always_crashes_fails_with_the_end_of_its_log(jobs, worker, c
 
 def test_outages_however_many_cost_no_job(jobs, worker, command, store, monkeypatch):
     works, stop = worker
-    monkeypatch.setattr("api.worker.worker.growing_delay", lambda *_: 1e-3)
+    waited: list[int] = []
+    monkeypatch.setattr("api.worker.worker.growing_delay", lambda tries, _: waited.append(tries) or 1e-3)
     monkeypatch.setattr("api.worker.worker.HEARTBEAT_SECONDS", 0.02)
     job = submit(jobs, QUICK_SCENE)
     catalog, elsewhere = store / "catalog.sqlite", store.with_name("elsewhere")
@@ -371,6 +386,7 @@ def test_outages_however_many_cost_no_job(jobs, worker, command, store, monkeypa
         thread.join()
     assert jobs.get(job.id).status is JobStatus.SUCCEEDED
     assert "attempt 1 ended with status 2 in an outage; tried again" in jobs.log_path(job).read_text()
+    assert max(waited) > MAXIMUM_CRASHES  # the job itself may be what fills the disk
 
 
 def test_a_job_that_needs_more_memory_than_it_may_have_says_so(launcher):
