@@ -19,12 +19,16 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 UNITS = "units"  # key of the units of a scene in the context of a validation
 
-# Products and quotients of named units with small powers.  More would let a text cost any time.
-_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+# Products and quotients of named units with small powers.  More would let a text cost any time.  What two
+# adjacent repetitions could both match would cost the square of its length.
+_NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
 _NAME = r"[^\W\d_]+(?:(?:\^|\*\*)-?\d)?"
 _QUANTITY = re.compile(rf"({_NUMBER})\s*((?:1?\s*/\s*)?{_NAME}(?:\s*[*·/ ]\s*{_NAME}){{0,5}})")
 _BEGINNING = re.compile(rf"\s*{_NUMBER}\s*(?:1\s*)?[^\d\s.]")
-_LONGEST = 100  # characters
+_LONGEST = 100  # characters of a number with a unit
+
+# Pint keeps what it has made of each unit, over a kilobyte.  Its registry takes a fifth of a second to make.
+_MOST_UNITS = 200
 
 # Conversion leaves a round-off that would make the key of a scene another one than that of its twin.
 _DIGITS = 14
@@ -140,8 +144,7 @@ class Dimension:
             return {
                 name: each if name == "kind" else self._converted(each, units) for name, each in value.items()
             }
-        has_unit = isinstance(value, str) and _BEGINNING.match(value) and not _is_number(value)
-        return self.number(value, units) if has_unit else value
+        return self.number(value, units) if isinstance(value, str) and _has_unit(value) else value
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         """Convert text with a unit before the field's own checks."""
@@ -170,7 +173,8 @@ def or_quantity(number: JsonSchemaValue, mode: str) -> JsonSchemaValue:
     """
     if mode == "serialization":
         return number
-    return {"anyOf": [number, {"type": "string", "pattern": f"^{_BEGINNING.pattern}"}]}
+    quantity = {"type": "string", "maxLength": _LONGEST, "pattern": f"^{_BEGINNING.pattern}"}
+    return {"anyOf": [number, quantity]}
 
 
 LENGTH = Dimension("length", "m", length=1)
@@ -210,15 +214,15 @@ def si_value(text: str, si: str, name: str) -> float:
         If it is no number with a unit, or of another dimension.
     """
     example = f"must be a number with a unit of {name}, such as '0.5 {si}'"
-    match = _QUANTITY.fullmatch(text.strip())
-    if match is None or len(text) > _LONGEST:
+    match = _quantity(text)
+    if match is None:
         raise ValueError(example)
     from pint import DimensionalityError, UndefinedUnitError
 
     number, unit = match.groups()
     unit = f"1 {unit}" if unit.startswith("/") else unit
     try:
-        return float(_registry().Quantity(float(number), unit.replace("·", "*")).to(si).magnitude)
+        return float(_registry_for(unit).Quantity(float(number), unit.replace("·", "*")).to(si).magnitude)
     except UndefinedUnitError as error:
         raise ValueError(f"{example}: {error}") from None
     except DimensionalityError as error:
@@ -238,7 +242,7 @@ def is_quantity(text: str) -> bool:
     -------
     bool
     """
-    return len(text) <= _LONGEST and _QUANTITY.fullmatch(text.strip()) is not None
+    return _quantity(text) is not None
 
 
 def rounded(value: float) -> float:
@@ -298,12 +302,31 @@ def dimension_of(annotation: Any) -> Dimension | None:
     return next(filter(None, map(dimension_of, arguments)), None)
 
 
-def _is_number(text: str) -> bool:
+def _quantity(text: str) -> re.Match[str] | None:
+    return _QUANTITY.fullmatch(text.strip()) if len(text) <= _LONGEST else None
+
+
+def _has_unit(text: str) -> bool:
+    """Return whether a text is meant to have a unit: it begins with a number and is none."""
+    if len(text) > _LONGEST or not _BEGINNING.match(text):
+        return False
     try:
         float(text)
     except ValueError:
-        return False
-    return True
+        return True
+    return False
+
+
+_units_seen = set[str]()
+
+
+def _registry_for(unit: str) -> Any:
+    """Return a registry of units, another one after many different units."""
+    if len(_units_seen) >= _MOST_UNITS:
+        _units_seen.clear()
+        _registry.cache_clear()
+    _units_seen.add(unit)
+    return _registry()
 
 
 @cache

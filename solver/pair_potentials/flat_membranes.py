@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -51,7 +52,8 @@ def at_rest(
     Raises
     ------
     ValueError
-        If they find no rest: a weak repulsion lets them cross.
+        If they find no rest, because a weak repulsion lets them cross, or if the energy cannot be computed
+        because the distance is too small or too large.
     """
 
     def integral(height: float, derivative: int) -> float:
@@ -66,7 +68,14 @@ def at_rest(
         return total  # of both sides
 
     closest = _NEAREST * distance
-    if integral(closest, 1) >= 0:
-        raise ValueError("two flat membranes do not keep a distance, its repulsion is too weak")
-    height = root(lambda height: integral(height, 1), closest, distance)
-    return FlatMembranes(-integral(height, 0), height)
+    energy = height = math.nan
+    with suppress(ArithmeticError):
+        slope = integral(closest, 1)
+        if slope >= 0:
+            raise ValueError("two flat membranes do not keep a distance, its repulsion is too weak")
+        if math.isfinite(slope):
+            height = root(lambda height: integral(height, 1), closest, distance, 1e-12 * distance)
+            energy = -integral(height, 0)
+    if not 0 < energy < math.inf:
+        raise ValueError(f"distance {distance:g} is too small or too large for an energy of flat membranes")
+    return FlatMembranes(energy, height)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Annotated, Any, Self
@@ -110,8 +111,14 @@ class PairPotential(Model, ABC):
         if len(given) != 1:
             raise ValueError("give either hamaker or adhesion_energy")
         if self.adhesion_energy is not None:
+            energy = self.adhesion_energy
+            hamaker = rounded(energy / self.flat_membranes.energy)
+            if not 0 < hamaker < math.inf and energy > 0:
+                raise ValueError(
+                    f"adhesion_energy {energy:g} is too small or too large: hamaker is {hamaker:g}"
+                )
             # As in `Scene._drop_arrangement`: equal potentials are equal, however they were given.
-            object.__setattr__(self, "hamaker", rounded(self.adhesion_energy / self.flat_membranes.energy))
+            object.__setattr__(self, "hamaker", hamaker)
             object.__setattr__(self, "adhesion_energy", None)
             self.model_fields_set.symmetric_difference_update(("hamaker", "adhesion_energy"))
         return self

@@ -10,13 +10,16 @@ from pydantic import AfterValidator, model_validator
 from solver.dimensions import BENDING_MODULUS, LENGTH, Dimension, rounded, si_value, with_prefix
 from solver.model import Model
 
+# With these all units that follow are numbers, too: that of time is between 1e-150 and 1e150 s.
+_LEAST, _MOST = 1e-30, 1e30  # of the SI
+
 
 def _stated(si: str, name: str) -> AfterValidator:
     """Check a text that states a unit of the scene."""
 
     def check(text: str) -> str:
-        if not 0 < si_value(text, si, name) < math.inf:
-            raise ValueError("must be more than 0")
+        if not _LEAST <= si_value(text, si, name) <= _MOST:
+            raise ValueError(f"must be at least {_LEAST:g} and at most {_MOST:g} {si}")
         return text
 
     return AfterValidator(check)
@@ -28,7 +31,7 @@ _Viscosity = Annotated[str, _stated("Pa*s", "viscosity")]
 
 
 class Units(Model):
-    """What the units of a scene are.  They enter no computation, and no key.
+    """What the units of a scene are, from 1e-30 to 1e30 in the SI.  They enter no computation, and no key.
 
     All other units follow: with R the radius, κ the bending modulus and μ the viscosity, that of time is
     μR³/κ, of tension and of energy per area κ/R², of the Hamaker constant κ/R³.

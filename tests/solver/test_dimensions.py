@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import gc
 import math
+import re
+import tracemalloc
+from itertools import islice, product
 
 import pytest
 
@@ -63,7 +67,11 @@ def test_units_of_laboratories_are_understood(text: str, si: str, value: float) 
         "2 m^99",
         "2 m; 1",
         "1 m" + " m" * 99,
+        "1" * 200_000,
+        "1" * 200_000 + " m",
+        "1" + " " * 200_000 + "m",
     ],
+    ids=lambda text: text[:20],
 )
 def test_what_is_no_length_is_refused_with_an_example_of_one(text: str) -> None:
     with pytest.raises(ValueError, match=r"must be a number with a unit of length, such as '0\.5 m'"):
@@ -109,7 +117,12 @@ def test_a_length_stands_for_a_radius() -> None:
     ("field", "value", "message"),
     [
         ("radius", "3 s", "unit of length, such as '0.5 m', got"),
-        ("radius", "0 m", "more than 0"),
+        ("radius", "0 m", "radius\n.*must be at least 1e-30 and at most 1e\\+30 m"),
+        ("radius", "1e150 m", "radius\n.*at most 1e\\+30 m"),
+        ("radius", "1e-150 m", "radius\n.*at least 1e-30"),
+        ("bending_modulus", "1e300 J", "bending_modulus\n.*at most 1e\\+30 J"),
+        ("viscosity", "1e-300 Pa s", "viscosity\n.*at most 1e\\+30 Pa\\*s"),
+        ("viscosity", "1e999 Pa s", "viscosity\n.*at most 1e\\+30 Pa\\*s"),
         ("bending_modulus", "1e-19 m", "unit of bending modulus, such as '0.5 J', got"),
         ("viscosity", "1", "unit of viscosity, such as '0.5 Pa\\*s'"),
         ("length", "60 um", "either radius or length"),
@@ -118,6 +131,46 @@ def test_a_length_stands_for_a_radius() -> None:
 def test_units_are_checked(field: str, value: str, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         Units.model_validate(UNITS.model_dump() | {field: value})
+
+
+@pytest.mark.parametrize("radius", ["1e-30 m", "1e30 m"])
+@pytest.mark.parametrize("bending_modulus", ["1e-30 J", "1e30 J"])
+@pytest.mark.parametrize("viscosity", ["1e-30 Pa*s", "1e30 Pa*s"])
+def test_all_that_follow_from_units_at_their_limits_are_numbers(
+    radius: str, bending_modulus: str, viscosity: str
+) -> None:
+    units = Units(radius=radius, bending_modulus=bending_modulus, viscosity=viscosity)
+    for dimension in DIMENSIONS:
+        assert 0 < units.scale(dimension) < math.inf
+        assert 0 < units.shown(dimension)[0] < math.inf
+
+
+@pytest.mark.parametrize("text", ["1" * 200_000 + "x", "1." + "1" * 200_000 + "x"], ids=["whole", "decimal"])
+def test_a_long_text_is_refused_as_a_number_of_a_scene(text: str) -> None:
+    """Also by the pattern that clients of the service check: its time is not the square of the length."""
+    with pytest.raises(ValueError, match=r"horizon\n.*should be a valid number"):
+        Scene.model_validate({"units": UNITS, "horizon": text, "vesicles": [{}]}, context={})
+    quantity = Scene.model_json_schema()["properties"]["horizon"]["anyOf"][1]
+    assert re.match(quantity["pattern"], text)
+    assert re.match(quantity["pattern"], text[:-1]) is None
+    assert quantity["maxLength"] < len(text)
+
+
+def test_different_units_are_not_kept_for_ever() -> None:
+    """A service is sent any number of them."""
+    prefixes = ("", "k", "m", "u", "n", "p", "c", "d", "M", "G", "da", "h")
+    texts = (f"1 {a}m*{b}s*{c}g/s/g" for a, b, c in product(prefixes, repeat=3))
+    kept = []
+    tracemalloc.start()
+    try:
+        for _ in range(3):
+            for text in islice(texts, 200):
+                si_value(text, LENGTH.si, LENGTH.name)
+            gc.collect()
+            kept.append(tracemalloc.get_traced_memory()[0])
+    finally:
+        tracemalloc.stop()
+    assert kept[2] < kept[0] + 400 * 200  # bytes; unbounded it is over a kilobyte for each of the last 400
 
 
 def test_every_length_time_and_rate_of_a_scene_states_its_dimension() -> None:

@@ -68,3 +68,25 @@ def test_an_energy_stands_for_the_hamaker_constant() -> None:
 def test_a_potential_has_one_strength(strength: dict[str, float]) -> None:
     with pytest.raises(ValueError, match="either hamaker or adhesion_energy"):
         PowerLaw.model_validate({"distance": 0.4} | strength)
+
+
+@pytest.mark.parametrize("distance", [1e-300, 1e-160, 1e160, 1e300])
+def test_a_distance_beyond_the_numbers_is_refused_by_its_name(distance: float) -> None:
+    potential = PowerLaw(hamaker=1.0, distance=distance)
+    with pytest.raises(ValueError, match=r"distance 1e.* is too small or too large"):
+        _ = potential.flat_membranes
+    with pytest.raises(ValueError, match=r"distance 1e.* is too small or too large"):
+        PowerLaw.model_validate({"adhesion_energy": 1.0, "distance": distance})
+
+
+@pytest.mark.parametrize(("energy", "distance"), [(1e300, 1e-20), (1e-320, 1e20)])
+def test_an_energy_whose_hamaker_constant_is_no_number_is_refused(energy: float, distance: float) -> None:
+    with pytest.raises(ValueError, match=r"adhesion_energy .* is too small or too large"):
+        PowerLaw.model_validate({"adhesion_energy": energy, "distance": distance})
+    assert PowerLaw.model_validate({"adhesion_energy": 0.0, "distance": distance}).hamaker == 0
+
+
+@pytest.mark.parametrize("distance", [1e-100, 1e-14, 1e100])
+def test_the_distance_at_rest_is_a_part_of_any_distance(distance: float) -> None:
+    flat = PowerLaw(hamaker=1.0, distance=distance).flat_membranes
+    assert flat.distance / distance == pytest.approx(0.75**0.5, rel=1e-9)
