@@ -20,7 +20,7 @@ from ensemble.config.validation import validated
 from solver.dimensions import is_quantity
 from solver.scene import Arrangement
 
-# Of two fields either one is given: to set one takes the other out.
+# Of two fields either one is given: to set one takes the other out of the document.
 _EITHER = {"hamaker": "adhesion_energy", "adhesion_energy": "hamaker"}
 
 LONGEST_NAME = 100  # characters of the name of a document
@@ -87,6 +87,8 @@ def override(document: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[st
         If a part of a path is empty, is an index outside an array, or lies inside a plain value.
     """
     changed: dict[str, Any] = _editable(document)
+    for path in changes:
+        _make_room(changed, path)
     for path, value in sorted(changes.items(), key=lambda change: "vesicles" in change[0].split(".")):
         _list_vesicles(changed, path)
         for location in locations(changed, path):
@@ -97,11 +99,19 @@ def override(document: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[st
                     node[key] = {}
                 node = node[key]
             node[last] = copy.deepcopy(value)
-            if last in _EITHER and isinstance(node, dict):
-                node.pop(_EITHER[last], None)
     if isinstance(document.get("name"), str) and "name" not in changes:
         changed["name"] = _name_with_changes(document, changes)
     return changed
+
+
+def _make_room(document: dict[str, Any], path: str) -> None:
+    """Take out what a field that is set stands instead of; the model refuses both in one set of changes."""
+    outer, _, last = path.rpartition(".")
+    if last in _EITHER and outer:
+        for location in locations(document, outer):
+            node = value_at(document, location)
+            if isinstance(node, dict):
+                node.pop(_EITHER[last], None)
 
 
 def _name_with_changes(document: Mapping[str, Any], changes: Mapping[str, Any]) -> str:

@@ -9,6 +9,7 @@ import pytest
 
 from ensemble.config.documents import load_scene, load_study, load_units, preset_document
 from ensemble.config.measured import Measured, dimension_at, measured_fields
+from ensemble.config.overrides import override
 from ensemble.config.run_key import run_key
 from ensemble.config.study import Study
 from ensemble.config.validation import validated
@@ -132,10 +133,38 @@ def test_a_unit_needs_the_units_of_the_scene() -> None:
 
 def test_an_energy_takes_the_place_of_the_hamaker_constant() -> None:
     scene = load_scene("doublet-shear", [*STATED, "adhesion.adhesion_energy=1 nJ/m^2"])
-    back = load_scene("doublet-shear", [*STATED, "adhesion.adhesion_energy=1 nJ/m^2", "adhesion.hamaker=0.7"])
+    back = override(scene.model_dump(), {"adhesion.hamaker": 0.7})
     assert scene.adhesion is not None
     assert scene.adhesion.hamaker == pytest.approx(1 / (4.8367983 * 0.4), rel=1e-7)
-    assert back.adhesion == load_scene("doublet-shear", ["adhesion.hamaker=0.7"]).adhesion
+    assert validated(Scene, back).adhesion == load_scene("doublet-shear", ["adhesion.hamaker=0.7"]).adhesion
+
+
+@pytest.mark.parametrize("first", ["adhesion.hamaker=0.7", "adhesion={hamaker = 0.7, distance = 0.4}"])
+def test_two_strengths_in_one_set_of_changes_are_refused(first: str) -> None:
+    with pytest.raises(ValueError, match="adhesion: give either hamaker or adhesion_energy"):
+        load_scene("doublet-shear", [first, "adhesion.adhesion_energy=1.0"])
+    with pytest.raises(ValueError, match="adhesion: give either hamaker or adhesion_energy"):
+        load_study(
+            "critical-extension-rate",
+            [f"scene.{first}", "scene.adhesion.adhesion_energy=1.0"],
+        )
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ("units.radius=1e150 m", r"units\.radius: '1e150 m' — must be at least 1e-30 and at most 1e\+30 m"),
+        ("units.radius=1e-150 m", r"units\.radius: '1e-150 m' — must be at least"),
+        ("adhesion.distance=1e300", r"adhesion: distance 1e\+300 is too small or too large"),
+        ("adhesion.distance=1e-300 m", r"adhesion: distance 1e-295 is too small or too large"),
+        ("adhesion.adhesion_energy=1e300", r"adhesion: adhesion_energy 1e\+300 is too small or too large"),
+    ],
+)
+def test_numbers_beyond_what_can_be_computed_are_refused_by_their_name(change: str, message: str) -> None:
+    energy = [] if "energy" in change else ["adhesion.adhesion_energy=1.0"]
+    distance = ["adhesion.distance=1e-20"] if energy == [] else []
+    with pytest.raises(ValueError, match=message):
+        load_scene("doublet-shear", [*STATED, *energy, *distance, change])
 
 
 def test_all_numbers_of_a_scene_are_shown_with_their_units() -> None:
