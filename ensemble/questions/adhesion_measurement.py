@@ -155,24 +155,20 @@ class _Dependence(NamedTuple):
     numerics: float
 
     def of_hamaker(self) -> dict[str, float]:
-        """Return the logarithmic derivatives of H, without units, by the inputs with theirs."""
-        return {
-            _RATE: self.rate,
-            _AREA: self.area,
-            _DISTANCE: self.distance,
-            _RADIUS: 3 * self.rate - self.distance,
-            _MODULUS: -self.rate,
-            _VISCOSITY: self.rate,
-        }
+        """Return the logarithmic derivatives of H, by the inputs, all with their units; its own is κ/R³."""
+        return self._with_units(self.distance, 3)
 
     def of_energy(self) -> dict[str, float]:
-        """Return those of the energy per area, with its unit κ/R²."""
-        distance = self.distance + self.energy
+        """Return those of the energy per area; its unit is κ/R²."""
+        return self._with_units(self.distance + self.energy, 2)
+
+    def _with_units(self, distance: float, power: int) -> dict[str, float]:
+        # Of κ/R^power f(rate μR³/κ, area, δ/R), where f has these derivatives.
         return {
             _RATE: self.rate,
             _AREA: self.area,
             _DISTANCE: distance,
-            _RADIUS: 3 * self.rate - distance - 2,
+            _RADIUS: 3 * self.rate - distance - power,
             _MODULUS: 1 - self.rate,
             _VISCOSITY: self.rate,
         }

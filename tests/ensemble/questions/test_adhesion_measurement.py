@@ -17,13 +17,14 @@ FOLD = 0.07702758  # of side by side at reduced area 0.85, H = 0.7 (solver/READM
 PAIR = ("--set=vesicles.reduced_area=0.85", "--set=numerics.points=32", "--set=numerics.tolerance=1e-3")
 ERRORS = {"flow.rate": 0.05, "units.radius": 0.04, "units.bending_modulus": 0.3, "adhesion.distance": 0.1}
 
+UNITS = {"units.radius": "3 um", "units.bending_modulus": "1e-19 J", "units.viscosity": "1 mPa*s"}
+MEASURED = {"flow.rate": f"{FOLD * 1e-19 / (1e-3 * 3e-6**3)!r} 1/s", "adhesion.distance": "1.2 um"}
+
 
 @pytest.fixture(scope="module")
 def document(ensemble, tmp_path_factory):
     """What the command prints for a pair whose adhesion is known, in the units of a laboratory."""
-    units = ("units.radius=3 um", "units.bending_modulus=1e-19 J", "units.viscosity=1 mPa*s")
-    rate = f"flow.rate={FOLD * 1e-19 / (1e-3 * 3e-6**3)!r} 1/s"
-    settings = (f"--set={each}" for each in (*units, rate, "adhesion.distance=1.2 um"))
+    settings = (f"--set={path}={value}" for path, value in (UNITS | MEASURED).items())
     errors = (f"--error={path}={error}" for path, error in ERRORS.items())
     store = tmp_path_factory.mktemp("measured") / "store"
     result = ensemble("measure-adhesion", *PAIR, *settings, *errors, f"--store={store}", "--json")
@@ -71,6 +72,23 @@ def test_sensitivities_have_the_dimensions_of_an_energy_per_area(document):
     assert modulus + viscosity == pytest.approx(1, abs=1e-12)
     assert distance + radius + 2 * modulus - viscosity == pytest.approx(0, abs=1e-12)
     assert -rate - 2 * modulus - viscosity == pytest.approx(-2, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "factor"),
+    [("units.radius", "3.003 um", 1.001), ("units.bending_modulus", "1.01e-19 J", 1.01)],
+)
+def test_errors_are_those_that_another_value_of_an_input_shows(document, path, value, factor):
+    """Of the quantities with units, while all other inputs are the same in the laboratory."""
+    inputs = UNITS | MEASURED | {path: value}
+    settings = [setting.removeprefix("--set=") for setting in PAIR]
+    scene = load_scene("doublet-trap", [*settings, *(f"{name}={each}" for name, each in inputs.items())])
+    changed = AdhesionMeasurement(scene, {path: 0.5}).answer(None).json_document()
+    for name in ("hamaker", "adhesion_energy"):
+        before, after = (each["in_units"][name] for each in (document, changed))
+        assert before["unit"] == after["unit"]
+        slope = math.log(after["value"] / before["value"]) / math.log(factor)
+        assert changed[f"{name}_error"] / changed[name] == pytest.approx(0.5 * abs(slope), abs=2e-3)
 
 
 def test_the_plan_looks_around_the_critical_rate_and_waits_for_the_slowest_motion(document):
