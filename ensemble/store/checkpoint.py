@@ -82,13 +82,14 @@ class Checkpoint:
         Raises
         ------
         StoreError
-            If there is a file from which the run cannot go on; the message says why.
+            If there is a file from which the run cannot go on; the message says why.  One of an earlier
+            `RESULTS_REVISION` is removed.
         """
         from ensemble.store.plain_hdf5 import UnreadableFileError, read_attributes, read_plain
 
         path = checkpoint_path(self._store, self.key)
         if not path.exists():
-            self._require_no_earlier_one()
+            self._remove_earlier_ones()
             return None
         try:
             attributes = read_attributes(path)
@@ -107,11 +108,18 @@ class Checkpoint:
     def _attributes(self) -> dict[str, str | int]:
         return {"key": self.key, "results_revision": RESULTS_REVISION}
 
-    def _require_no_earlier_one(self) -> None:
+    def _remove_earlier_ones(self) -> None:
+        """Remove what no later run can go on from, and say so."""
+        removed = []
         for revision in range(1, RESULTS_REVISION):
-            path = checkpoint_path(self._store, run_key(self._scene, revision))
-            if path.exists():
-                raise StoreError(f"{path} has the results_revision {revision}, and not {RESULTS_REVISION}")
+            key = run_key(self._scene, revision)
+            if checkpoint_path(self._store, key).exists():
+                remove_checkpoint(self._store, key)
+                removed.append(revision)
+        if removed:
+            raise StoreError(
+                f"it has the results_revision {removed[-1]}, and not {RESULTS_REVISION}; it is removed"
+            )
 
 
 def checkpoint_path(store: Path, key: str) -> Path:

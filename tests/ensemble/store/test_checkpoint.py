@@ -4,7 +4,6 @@ About 15 s of processor time."""
 
 from __future__ import annotations
 
-import os
 import pickle
 from collections.abc import Iterator
 from pathlib import Path
@@ -25,6 +24,7 @@ from solver import RESULTS_REVISION, Simulation, simulate
 from solver.integrators.integrator import FACTORIES
 from solver.memory import Saved
 from solver.scene import Scene
+from tests.full_disks import ENTRIES, ROOM, filled, small_disk
 from tests.solver.restarts import PAIR, SCENES, arrays_of, numerics, restarted
 
 
@@ -146,23 +146,29 @@ def test_one_of_another_run_or_revision_is_not_read(staging: RunStaging) -> None
         with h5py.File(path, "r+") as file:
             file.attrs[name] = kept
     assert checkpoint.read() is not None
-    path.rename(checkpoint_path(staging.path, run_key(PAIR, RESULTS_REVISION - 1)))
-    with pytest.raises(StoreError, match=f"has the results_revision {RESULTS_REVISION - 1}"):
+    earlier = checkpoint_path(staging.path, run_key(PAIR, RESULTS_REVISION - 1))
+    path.rename(earlier)
+    with pytest.raises(StoreError, match=f"has the results_revision {RESULTS_REVISION - 1}.* is removed"):
         checkpoint.read()
+    assert not earlier.exists()
+    assert checkpoint.read() is None
 
 
-def test_a_disk_that_does_not_take_it_leaves_the_one_before(
-    staging: RunStaging, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    checkpoint = staging.checkpoint(PAIR)
-    checkpoint.write(state_after(PAIR, 5))
-    before = typed(checkpoint.read())
-    monkeypatch.setattr(os, "fsync", lambda _: (_ for _ in ()).throw(OSError(28, "No space left on device")))
-    with pytest.raises(OSError, match="No space"):
-        checkpoint.write(state_after(PAIR, 6))
-    monkeypatch.undo()
-    assert typed(checkpoint.read()) == before
-    assert [path.name for path in staging.directory().iterdir()] == ["writer.lock"]
+@pytest.mark.parametrize("option", [ROOM, ENTRIES])
+def test_a_disk_that_does_not_take_it_leaves_the_one_before(tmp_path: Path, option: str) -> None:
+    with small_disk(tmp_path / "disk", option) as disk:
+        Store.open(disk / "store").close()
+        with RunStaging(disk / "store") as staging:
+            checkpoint = staging.checkpoint(PAIR)
+            checkpoint.write(state_after(PAIR, 5))
+            before = typed(checkpoint.read())
+            later = state_after(PAIR, 6)
+            with filled(disk), pytest.raises(OSError, match="No space"):
+                checkpoint.write(later)
+            assert typed(checkpoint.read()) == before
+            assert [path.name for path in staging.directory().iterdir()] == ["writer.lock"]
+            checkpoint.write(later)
+            assert typed(checkpoint.read()) == typed(pickle.loads(pickle.dumps(later)))
 
 
 def test_a_commit_removes_it(tmp_path: Path) -> None:
