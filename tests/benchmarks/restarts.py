@@ -140,10 +140,15 @@ class Restarts:
         status = job.launcher.returncode
         if "Traceback" in job.said or "begins anew" in job.said:
             self.tally.faults.append(job.said)
-        if status not in (0, SUSPENDED_STATUS) and not (in_time and self._signal is signal.SIGKILL):
+        # Between the commit and the end of a process a signal ends it as one that has no run in progress.
+        kept = self._is_kept()
+        allowed = status in (0, SUSPENDED_STATUS) or kept or (in_time and self._signal is signal.SIGKILL)
+        if not allowed:
             self.tally.faults.append(f"status {status}: {job.said}")
-        if status == 0:
+        if kept:
             self._compare()
+        elif status == 0:
+            self.tally.faults.append("an answer whose run is not kept")
 
     def _end(self, job: Job) -> None:
         if written := newest_checkpoint(self._store):  # else the run has just been committed
@@ -151,6 +156,10 @@ class Restarts:
         part = self._chance.choice(["launcher", "rank"]) if self._signal is signal.SIGKILL else "launcher"
         with suppress(psutil.NoSuchProcess):  # it has just ended
             (job.victim(part, self._chance) or job.launcher).send_signal(self._signal)
+
+    def _is_kept(self) -> bool:
+        with Store.existing(self._store) as store:
+            return store.count_runs() > 0
 
     def _compare(self) -> None:
         self.tally.done += 1
