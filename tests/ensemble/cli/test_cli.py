@@ -243,7 +243,7 @@ def test_run_loads_no_library_it_does_not_need(ensemble):
 def test_bisect_prints_the_documented_fields(finished_study):
     document = finished_study.document
     assert document.keys() == {"study", "boundary", "criteria", "wall_seconds", "busy_fraction", "store"}
-    assert document["study"].startswith("critical-hamaker, sweep.values=[0.5, 0.75, 1.0], ")
+    assert document["study"].startswith("critical-hamaker, scene.numerics.points=32, ")
     assert Path(document["store"]) == finished_study.store
     assert [point["parameters"] for point in document["boundary"]] == [
         {"flow.rate": rate} for rate in (0.5, 0.75, 1.0)
