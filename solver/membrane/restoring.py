@@ -115,6 +115,20 @@ def _deviations(tangents: Array, offsets: Array, reduced_area: float) -> Array:
 
 
 @compiled
+def _membrane(
+    tangents: Array, points: Array, centers: Array, wavenumber: Array, vesicle: int
+) -> tuple[Array, Array]:
+    """Return the tangents of one membrane, and its points about its center in units of length/2π."""
+    own, about = np.empty((2, tangents.shape[2])), np.empty((2, tangents.shape[2]))
+    for component in range(2):
+        for j in range(own.shape[1]):
+            own[component, j] = tangents[component, vesicle, j]
+            offset = points[component, vesicle, j] - centers[component, vesicle]
+            about[component, j] = offset * wavenumber[vesicle, 0]
+    return own, about
+
+
+@compiled
 def _write_rate(
     tangents: Array,
     points: Array,
@@ -126,14 +140,9 @@ def _write_rate(
     rate: Array,
 ) -> None:
     """Write the term for all membranes, (M, N)."""
-    own, about = np.empty((2, tangents.shape[2])), np.empty((2, tangents.shape[2]))
     multipliers = np.empty(3)
     for vesicle in range(rate.shape[0]):
-        for component in range(2):
-            for j in range(own.shape[1]):
-                own[component, j] = tangents[component, vesicle, j]
-                offset = points[component, vesicle, j] - centers[component, vesicle]
-                about[component, j] = offset * wavenumber[vesicle, 0]
+        own, about = _membrane(tangents, points, centers, wavenumber, vesicle)
         gradients, products = _gradients(own, about, held)
         _solve(products, _deviations(own, about, reduced_area[vesicle]), multipliers)
         for j in range(own.shape[1]):
@@ -291,8 +300,13 @@ class Restoring:
         points = geometry.membranes.points
         change = np.empty((points, points))
         _write_jacobian(
-            np.ascontiguousarray(geometry.tangents[:, vesicle]),
-            np.ascontiguousarray(_offsets(geometry)[:, vesicle]),
+            *_membrane(
+                geometry.tangents,
+                geometry.points,
+                geometry.centers,
+                geometry.membranes.wavenumber,
+                vesicle,
+            ),
             float(self.reduced_area[vesicle]),
             float(self.strength[vesicle]),
             integration(points),
@@ -300,8 +314,3 @@ class Restoring:
             change,
         )
         return change
-
-
-def _offsets(geometry: Geometry) -> Array:
-    """Return the points about the centers in units of length/2π, (2, M, N)."""
-    return (geometry.points - geometry.centers[:, :, None]) * geometry.membranes.wavenumber
