@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from datetime import UTC, datetime
 from http import HTTPStatus
+from pathlib import Path
 
 from fastapi import APIRouter
 from fastapi.responses import HTMLResponse
@@ -51,7 +52,7 @@ def list_reports(reader: Reader) -> CollectionPage[ReportDocument]:
     -------
     CollectionPage
     """
-    pages = {name: report_directory(reader.service.store.path, name) / PAGE for name in ReportName}
+    pages = {name: _page(reader, name) for name in ReportName}
     made = [
         ReportDocument(name=name, updated=datetime.fromtimestamp(page.stat().st_mtime, UTC))
         for name, page in pages.items()
@@ -73,7 +74,11 @@ def get_report(reader: Reader, name: ReportName) -> HTMLResponse:
     -------
     HTMLResponse
     """
-    page = report_directory(reader.service.store.path, name) / PAGE
+    page = _page(reader, name)
     if not page.exists():
         raise HTTPException(HTTPStatus.NOT_FOUND, f"nobody has made the report {name} into this store")
     return HTMLResponse(page.read_text(encoding="utf-8"), headers=_HEADERS)
+
+
+def _page(reader: Reader, name: ReportName) -> Path:
+    return report_directory(reader.service.store.path, name) / PAGE

@@ -50,6 +50,26 @@ class Measured(NamedTuple):
             return cls([rounded(each * factor) for each in value], unit)
         return cls(rounded(value * factor), unit)
 
+    @classmethod
+    def known(cls, value: Any, dimension: Dimension | None, units: Units | None) -> Measured | None:
+        """Convert a number of a scene or of its run, if it has a unit and the unit is known.
+
+        Parameters
+        ----------
+        value : float or sequence of float
+        dimension : Dimension or None
+            None if it has none.
+        units : Units or None
+            None if the scene has none.
+
+        Returns
+        -------
+        Measured or None
+        """
+        if units is None or dimension is None or dimension.is_pure:
+            return None
+        return cls.of(value, dimension, units)
+
 
 def dimension_at(node: Any, path: str) -> Dimension | None:
     """Return the dimension that the field at a dotted path states.
@@ -107,14 +127,32 @@ def measured_fields(node: Any, document: Mapping[str, Any], units: Units | None)
     dict
         By dotted path; empty without units.
     """
-    fields = dict[str, Measured]()
     if units is None:
-        return fields
-    for path, value in _numbers(document):
-        dimension = dimension_at(node, path)
-        if dimension is not None and not dimension.is_pure:
-            fields[path] = Measured.of(value, dimension, units)
-    return fields
+        return {}
+    return measured_values(
+        {path: (each, dimension_at(node, path)) for path, each in _numbers(document)}, units
+    )
+
+
+def measured_values(
+    values: Mapping[str, tuple[Any, Dimension | None]], units: Units | None
+) -> dict[str, Measured]:
+    """Return those of some numbers that have a unit which is known, with it.
+
+    Parameters
+    ----------
+    values : mapping of str to (float or list of float, Dimension or None)
+        By name.
+    units : Units or None
+        None if the scene has none.
+
+    Returns
+    -------
+    dict
+        By name; empty without units.
+    """
+    measured = {name: Measured.known(value, dimension, units) for name, (value, dimension) in values.items()}
+    return {name: each for name, each in measured.items() if each is not None}
 
 
 def measured_document(fields: Mapping[str, Measured]) -> dict[str, Any]:

@@ -100,9 +100,8 @@ def with_unit(label: str, dimension: Dimension | None, scene: Scene) -> str:
     str
         Such as ``gap (10 µm)``: where the axis says 2, the gap is 20 µm.
     """
-    if scene.units is None or dimension is None or dimension.is_pure:
-        return label
-    return f"{label} ({Measured.of(1.0, dimension, scene.units)})"
+    one = Measured.known(1.0, dimension, scene.units)
+    return label if one is None else f"{label} ({one})"
 
 
 def axis_label(path: str, scene: Scene) -> str:
@@ -163,10 +162,10 @@ def describe(scene: Scene, without: Collection[str] = ()) -> str:
 
 def _in_units(path: str, numbers: list[float], scene: Scene) -> str:
     """Return a single number with its unit in brackets, if that is known."""
-    dimension = dimension_at(scene, path)
-    if scene.units is None or dimension is None or dimension.is_pure or len(numbers) > 1:
+    if len(numbers) > 1:
         return ""
-    return f" ({Measured.of(numbers[0], dimension, scene.units)})"
+    measured = Measured.known(numbers[0], dimension_at(scene, path), scene.units)
+    return "" if measured is None else f" ({measured})"
 
 
 def _numbers(values: list[float]) -> str:

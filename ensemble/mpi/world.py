@@ -236,8 +236,8 @@ def abort_guard(communicator: Intracomm | None) -> Iterator[None]:
     """End the whole job, with status 1, when an exception leaves the block on this rank.
 
     Otherwise the other ranks would wait for this one for ever.  `BadInput` passes: it comes from `on_root`
-    and leaves the block on every rank.  So does an interruption: either
-    there is one rank, or the job was asked to end, and every rank raises it.
+    and leaves the block on every rank.  So does an interruption: either there is one rank, or the job was
+    asked to end, and every rank raises it.
 
     Parameters
     ----------

@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple, Self
 
 from ensemble.config.dotted_paths import parameter_value
-from ensemble.config.measured import Measured, measured_document
+from ensemble.config.measured import Measured, measured_document, measured_values
 from ensemble.config.overrides import override
 from ensemble.config.validation import nearest, validated
 from ensemble.questions.branches import NoAnswer, opened, run_of
 from ensemble.questions.question import Answer
-from solver.dimensions import ADHESION_ENERGY, HAMAKER, RATE, TIME, Dimension
+from solver.dimensions import ADHESION_ENERGY, HAMAKER, RATE, TIME
 from solver.scene import Scene
 
 if TYPE_CHECKING:
@@ -322,10 +322,8 @@ class _MeasuredAdhesion(Answer):
 
     @cached_property
     def _measured(self) -> dict[str, Measured]:
-        units, plan = self.measurement.scene.units, self._fields["plan"]
-        if units is None:
-            return {}
-        dimensions: dict[str, Dimension] = {
+        fields, plan = self._fields, self._fields["plan"]
+        dimensions = {
             "critical_rate": RATE,
             "hamaker": HAMAKER,
             "hamaker_error": HAMAKER,
@@ -333,9 +331,9 @@ class _MeasuredAdhesion(Answer):
             "adhesion_energy_error": ADHESION_ENERGY,
         }
         of_plan = {"from": RATE, "to": RATE, "step": RATE, "hold": TIME}
-        return {
-            name: Measured.of(self._fields[name], dimension, units) for name, dimension in dimensions.items()
-        } | {f"plan.{name}": Measured.of(plan[name], dimension, units) for name, dimension in of_plan.items()}
+        values = {name: (fields[name], dimension) for name, dimension in dimensions.items()}
+        values |= {f"plan.{name}": (plan[name], dimension) for name, dimension in of_plan.items()}
+        return measured_values(values, self.measurement.scene.units)
 
     def json_document(self) -> dict[str, Any]:
         known = {"branch_key": self.branch_key, "wall_seconds": self.seconds}

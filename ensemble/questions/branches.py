@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ensemble.config.dotted_paths import parameter_value
-from ensemble.config.measured import Measured, measured_document, measured_fields
+from ensemble.config.measured import Measured, measured_document, measured_fields, measured_values
 from ensemble.config.overrides import override
 from ensemble.config.run_key import run_key
 from ensemble.config.validation import validated
@@ -196,12 +196,8 @@ def settled_answer(scene: Scene, path: Path | None) -> Answer:
     except ArithmeticError as error:
         return NoAnswer(str(error))
     record = {"outcome": run.outcome, "period": run.period} | breaking.record()
-    dimensions = {"period": TIME, "growth_rate": RATE}
-    measured = {
-        name: Measured.of(record[name], dimension, scene.units)
-        for name, dimension in dimensions.items()
-        if scene.units is not None
-    }
+    values = {"period": (record["period"], TIME), "growth_rate": (record["growth_rate"], RATE)}
+    measured = measured_values(values, scene.units)
     return _SteadyAnswer(record, run_key(scene), measured)
 
 

@@ -227,13 +227,15 @@ def run_document(summary: RunSummary) -> dict[str, Any]:
         A quantity that the scene does not have is None.  Where the units of the scene are known, the
         results in these are added as ``in_units``.
     """
+    return _results_and_cost(summary) | measured_document(measured_results(summary))
+
+
+def _results_and_cost(summary: RunSummary) -> dict[str, Any]:
     document = summary.document()
-    results = {name: document[name] for name in _RESULTS}
     return (
-        results
+        {name: document[name] for name in _RESULTS}
         | {name: document["work"][name] for name in _WORK}
         | {"run_key": summary.key, "results_revision": summary.results_revision}
-        | measured_document(measured_results(summary))
     )
 
 
@@ -254,12 +256,6 @@ def measured_results(summary: RunSummary) -> dict[str, Measured]:
     return measured_fields(summary, results, summary.scene.units)
 
 
-def _table(document: dict[str, Any], measured: Mapping[str, Measured]) -> Table:
-    from ensemble.display.result_tables import fields_table
-
-    return fields_table({name: document[name] for name in document if name != "in_units"}, measured)
-
-
 @dataclass(frozen=True)
 class _FinishedRun(Answer):
     """A run that has just been made, or that the store had already."""
@@ -277,7 +273,9 @@ class _FinishedRun(Answer):
         return run_document(self.summary)
 
     def table(self) -> Table:
-        return _table(run_document(self.summary), measured_results(self.summary))
+        from ensemble.display.result_tables import fields_table
+
+        return fields_table(_results_and_cost(self.summary), measured_results(self.summary))
 
     @property
     def footer(self) -> str | None:
@@ -300,10 +298,12 @@ class _StoredRun(StoredAnswer):
 
     def table(self) -> Table:
         """Return the results and the cost of the run, and the scene that it is of."""
+        from ensemble.display.result_tables import fields_table
+
         scene = self.summary.scene
         document = {"scene": scene.model_dump(mode="json", exclude_none=True)}
         measured = measured_results(self.summary) | measured_fields(self.summary, document, scene.units)
-        return _table(run_document(self.summary) | document, measured)
+        return fields_table(_results_and_cost(self.summary) | document, measured)
 
     def draw(self, output: Path) -> None:
         """Draw what happened in the run, or its movie."""

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from ensemble.config.measured import Measured, dimension_at, measured_document
+from ensemble.config.measured import Measured, dimension_at, measured_document, measured_values
 from ensemble.timestamp import Timestamp
 from solver.dimensions import Dimension
 from solver.scene import Numerics, Scene, Units
@@ -206,13 +206,7 @@ class Boundary(BaseModel):
                     "critical_value": (point.critical_value, searched),
                     "bracket": (point.bracket, searched),
                 }
-            measured.append(
-                {
-                    name: Measured.of(value, dimension, scene.units)
-                    for name, (value, dimension) in values.items()
-                    if dimension is not None and not dimension.is_pure
-                }
-            )
+            measured.append(measured_values(values, scene.units))
         return measured
 
     def point_documents(self) -> list[dict[str, Any]]:

@@ -156,10 +156,7 @@ class BranchSummary(BaseModel):
         Measured or None
             None if it has no unit, or the units are not known.
         """
-        dimension = dimension_at(self.scene, self.parameter)
-        if self.scene.units is None or dimension is None or dimension.is_pure:
-            return None
-        return Measured.of(point.value, dimension, self.scene.units)
+        return Measured.known(point.value, dimension_at(self.scene, self.parameter), self.scene.units)
 
     def in_units(self, units: Units | None) -> Self:
         """Return the branch as if its scene had other units, or none.

@@ -15,6 +15,9 @@ from numcodecs import Zstd
 
 from solver.analysis.run import Array
 
+# What a damaged archive, or damaged JSON, makes the readers raise.
+DAMAGE = (OSError, ValueError, KeyError, TypeError, BadZipFile, NotImplementedError, EOFError)
+
 # What `zarr_groups.write_group` gives zarr to write; the rest of the metadata depends on the array.
 WRITTEN: dict[str, Any] = {
     "zarr_format": 3,
@@ -55,17 +58,7 @@ def read_written(file: ZipFile, name: str) -> Array | None:
         if sorted(keys) != sorted(key for key in file.namelist() if key.startswith(f"{name}/c/")):
             return None
         chunks = [_chunk(file.read(key), (rows, *shape[1:])) for key in keys]
-    # As many errors as there are kinds of damage: of the archive, of JSON, of the compression.
-    except (
-        OSError,
-        ValueError,
-        KeyError,
-        TypeError,
-        RuntimeError,
-        BadZipFile,
-        NotImplementedError,
-        EOFError,
-    ):
+    except (*DAMAGE, RuntimeError):  # the latter of the compression
         return None
     return np.concatenate(chunks)[: shape[0]] if chunks else np.empty(shape)
 

@@ -14,7 +14,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile, ZipFile
+from zipfile import ZipFile
 
 import numpy as np
 import zarr
@@ -23,7 +23,7 @@ from zarr.storage import LocalStore, ZipStore
 
 from ensemble.errors import StoreError
 from ensemble.store.run_record import NamedArray
-from ensemble.store.written_arrays import read_written
+from ensemble.store.written_arrays import DAMAGE, read_written
 from solver.analysis.run import Array
 
 ARCHIVE = "zarr.zip"
@@ -172,8 +172,7 @@ class StoredGroup:
     def _opening(self) -> Iterator[None]:
         try:
             yield
-        # A damaged zip archive fails in many ways, and so do damaged metadata.
-        except (OSError, ValueError, KeyError, TypeError, BadZipFile, NotImplementedError, EOFError) as error:
+        except DAMAGE as error:
             raise StoreError(f"{self.name}: no readable group ({error})") from error
 
     def _array(self, name: str) -> zarr.Array[Any]:
