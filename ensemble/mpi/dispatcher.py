@@ -24,7 +24,7 @@ from ensemble.mpi.world import abort_guard
 from ensemble.search.task_queue import RunAnswer, SomeTask, Task, TaskQueue
 
 if TYPE_CHECKING:
-    from mpi4py.MPI import Intracomm
+    from mpi4py.MPI import Intracomm, Request
 
     from ensemble.mpi.end_requests import EndRequests
     from ensemble.mpi.store_on_ranks import StoreOnRank
@@ -235,6 +235,7 @@ class Dispatcher(Generic[SomeTask]):
         self._rank_of: dict[str, int] = {}  # of a task that is running, by its key
         self._idle: list[int] = []  # a heap
         self._cancelled: set[str] = set()
+        self._sent: list[Request] = []  # orders that a rank may not have taken yet
         self._runs = 0
         self._changed = False
         self._ends = False
@@ -258,7 +259,9 @@ class Dispatcher(Generic[SomeTask]):
             self._publish_if_due()
         self._publish()
         for rank in self._idle:
-            _send(self._communicator, Stop(), rank, _ORDERS)
+            self._order(Stop(), rank)
+        for order in self._sent:
+            order.wait()
         if not self._queue.done:
             return None
         return RunUsage(self._runs, self._meter.elapsed, self._meter.fractions())
@@ -280,7 +283,7 @@ class Dispatcher(Generic[SomeTask]):
         if not self._ends and self._requests.arrived:
             self._ends = True
             for rank in self._running:
-                _send(self._communicator, Suspend(), rank, _ORDERS)
+                self._order(Suspend(), rank)
 
     def _publish_if_due(self) -> None:
         if self._changed and time.monotonic() >= self._next_publication:
@@ -313,7 +316,7 @@ class Dispatcher(Generic[SomeTask]):
         for task in self._queue.unneeded_tasks():
             rank = self._rank_of.get(task.key)
             if rank is not None and task.key not in self._cancelled:
-                _send(self._communicator, Cancel(task.key), rank, _ORDERS)
+                self._order(Cancel(task.key), rank)
                 self._cancelled.add(task.key)
 
     def _assign(self) -> None:
@@ -322,8 +325,13 @@ class Dispatcher(Generic[SomeTask]):
             self._cancelled.discard(task.key)
             self._running[rank] = task
             self._rank_of[task.key] = rank
-            _send(self._communicator, task, rank, _ORDERS)
+            self._order(task, rank)
         self._meter.record_idle(len(self._idle))
+        self._sent = [order for order in self._sent if not order.Test()]
+
+    def _order(self, order: DispatcherOrder, rank: int) -> None:
+        """Send without waiting for the rank, which may itself be waiting for its report to be taken."""
+        self._sent.append(self._communicator.isend(order, dest=rank, tag=_ORDERS))
 
     def _progress(self) -> JobProgress[SomeTask]:
         return JobProgress(

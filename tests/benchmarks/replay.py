@@ -34,7 +34,7 @@ from ensemble.mpi.usage import UsageMeter
 from ensemble.search.point_search import SearchRun
 from ensemble.search.study_planner import StudyPlanner
 from ensemble.store import Store
-from tests.benchmarks.dispatching import answer
+from tests.benchmarks.dispatching import TakenOrder, answer
 from tests.ensemble.runs import shear_run, shear_scene
 
 MESSAGES = 2000
@@ -82,7 +82,7 @@ class SimulatedGroups:
     def Get_size(self) -> int:  # noqa: N802  the name in mpi4py
         return self.groups
 
-    def send(self, order: Any, dest: int, tag: int) -> None:
+    def isend(self, order: Any, dest: int, tag: int) -> TakenOrder:
         pickle.dumps(order)
         self.clock.charged += self.message_seconds
         now = self.clock.monotonic()
@@ -96,6 +96,7 @@ class SimulatedGroups:
                 self._void.add(number)
                 del self._running[dest]
                 self._report(now, Unfinished(now - begin), dest)
+        return TakenOrder()
 
     def improbe(self, source: int, tag: int, status: Any) -> SimulatedGroups | None:
         while self._reports and self._reports[0][1] in self._void:

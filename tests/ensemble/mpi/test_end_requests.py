@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from ensemble.errors import SUSPENDED_STATUS
+from ensemble.store import Store
 
 BATCHES = """
 import os, signal, sys, time
@@ -45,6 +46,33 @@ except Interrupted as interrupted:
     sys.exit(interrupted.status)
 """
 
+# The first rank stages a run, and will report it, while the order to keep that run is sent to it.
+CROSSING = """
+import os, signal, sys, time
+from pathlib import Path
+from ensemble.errors import Interrupted
+from ensemble.interrupts import end_with_one_line
+end_with_one_line()
+from ensemble.mpi.run_study import run_batch
+from ensemble.mpi.store_on_ranks import store_on_ranks
+from ensemble.mpi.world import abort_guard, world
+from tests.ensemble.runs import shear_scene
+communicator = world()
+try:
+    with abort_guard(communicator), store_on_ranks(communicator, Path(sys.argv[1])) as store:
+        stage = store.stage
+
+        def stage_late(run):
+            os.kill(os.getpid(), signal.SIGTERM)
+            time.sleep(0.5)  # the order is sent
+            return stage(run)
+
+        store.stage = stage_late
+        run_batch(communicator, [shear_scene(1.0), shear_scene(2.0)], store, lambda _: None)
+except Interrupted as interrupted:
+    sys.exit(interrupted.status)
+"""
+
 STEADY = """
 import os, signal, sys
 from pathlib import Path
@@ -74,6 +102,13 @@ def test_the_next_runs_of_a_command_are_not_made(launcher, tmp_path: Path, asked
     assert result.returncode == SUSPENDED_STATUS, result.stderr
     assert result.stdout.split() == ["first", "known"]
     assert result.stderr.count("ends after the next step") == 1
+
+
+def test_an_order_and_the_report_that_it_crosses_do_not_wait_for_each_other(launcher, tmp_path: Path) -> None:
+    result = launcher.run(1, [sys.executable, "-c", CROSSING, str(tmp_path / "store")])
+    assert result.returncode == SUSPENDED_STATUS, result.stderr
+    with Store.existing(tmp_path / "store") as store:
+        assert len(list(store.summaries())) == 1
 
 
 def test_a_search_that_starts_from_a_run_is_not_begun(tmp_path: Path) -> None:
