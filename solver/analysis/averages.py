@@ -34,13 +34,15 @@ def pair_inclination(center_angle: Array) -> Array:
     return np.asarray(90 + np.degrees(np.arcsin(np.abs(np.sin(center_angle)))))
 
 
-def inclination(scene: Scene, series: Series) -> float | None:
+def inclination(scene: Scene, series: Series, tracker: RevolutionTracker | None = None) -> float | None:
     """Return the inclination at the end: of a single vesicle's long axis against x, or of a pair in strain.
 
     Parameters
     ----------
     scene : Scene
     series : Series
+    tracker : RevolutionTracker or None
+        See `revolves`; None for a state at rest.
 
     Returns
     -------
@@ -49,7 +51,8 @@ def inclination(scene: Scene, series: Series) -> float | None:
     """
     if "inclination_angle" in series:
         return float(np.degrees(series["inclination_angle"][-1]))
-    if scene.imposed_flow and scene.imposed_flow.strains and "center_angle" in series:
+    strains = scene.imposed_flow is not None and scene.imposed_flow.strains
+    if strains and "center_angle" in series and not revolves(scene, tracker):
         return float(pair_inclination(series["center_angle"][-1]))
     return None
 
@@ -68,6 +71,41 @@ def steady_viscosity(series: Series) -> Viscosity | None:
     """
     parts = {name: float(series[name][-1]) for name in series if name.startswith("viscosity_")}
     return viscosity_of(parts) if parts else None
+
+
+def revolves(scene: Scene, tracker: RevolutionTracker | None) -> bool:
+    """Return whether a run has ended in revolutions that repeat themselves.
+
+    Parameters
+    ----------
+    scene : Scene
+    tracker : RevolutionTracker or None
+        Of the pair's line of centers or the single vesicle's long axis, where one was followed.
+
+    Returns
+    -------
+    bool
+    """
+    return tracker is not None and tracker.has_settled(scene.criteria.settled_change)
+
+
+def is_at_rest(scene: Scene, outcome: Outcome, tracker: RevolutionTracker | None) -> bool:
+    """Return whether a run in a flow has ended at rest, and not in a motion that repeats itself.
+
+    Parameters
+    ----------
+    scene : Scene
+    outcome : Outcome
+    tracker : RevolutionTracker or None
+        Of the pair's line of centers or the single vesicle's long axis, where one was followed.
+
+    Returns
+    -------
+    bool
+    """
+    if outcome is Outcome.BOUND:  # of a pair that may revolve, or rest side by side
+        return not revolves(scene, tracker)
+    return outcome in (Outcome.STEADY, Outcome.END_TO_END)
 
 
 def viscosity(
@@ -97,7 +135,7 @@ def viscosity(
     """
     if history is None:
         return None
-    if outcome is Outcome.STEADY:
+    if is_at_rest(scene, outcome, tracker):
         return steady_viscosity(series)
     if tracker:
         return history.average(*tracker.last_turn) if tracker.last_turn else None

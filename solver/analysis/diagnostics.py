@@ -71,19 +71,22 @@ def viscosity_measures(scene: Scene, equation: EquationOfMotion) -> dict[str, Me
     Returns
     -------
     dict
-        As of `measures`; empty without shear.
+        As of `measures`; empty for flows without a viscosity.
     """
-    shear_rate = scene.flow.shear_rate if scene.flow else None
-    if not shear_rate:
+    flow = scene.flow
+    if flow is None or not (shear_rate := flow.shear_rate):
         return {}
+    gradient = np.array(flow.velocity_gradient(np.zeros(2)) / shear_rate)
     area = equation.membranes.multiplicity * _areas(scene.vesicles[: equation.membranes.count]).sum()
     scale = 1 / (shear_rate * area)
-    parts: dict[str, Measure] = {"viscosity_bending_tension": lambda motion: scale * membrane_stress(motion)}
+    parts: dict[str, Measure] = {
+        "viscosity_bending_tension": lambda motion: scale * membrane_stress(motion, gradient)
+    }
     if equation.adhesion:
-        parts["viscosity_adhesion"] = lambda motion: scale * adhesion_stress(motion)
+        parts["viscosity_adhesion"] = lambda motion: scale * adhesion_stress(motion, gradient)
     if equation.contrast:
-        stress = equation.contrast.stress
-        parts["viscosity_contrast"] = lambda motion: scale * stress(motion.geometry, motion.velocity)
+        added = equation.contrast.stress
+        parts["viscosity_contrast"] = lambda motion: scale * added(motion.geometry, motion.velocity, gradient)
     return parts
 
 

@@ -4,6 +4,7 @@ from typing import Annotated
 
 from solver.flows.extension import Extension
 from solver.flows.imposed_flow import ImposedFlow, Symbol
+from solver.flows.linear import Linear
 from solver.flows.shear import Shear
 from solver.flows.trap import Trap
 from solver.registry import Registry
@@ -12,7 +13,8 @@ FLOWS: Registry[ImposedFlow] = Registry()
 FLOWS.add(Shear)
 FLOWS.add(Extension)
 FLOWS.add(Trap)
+FLOWS.add(Linear)
 
 Flow = Annotated[ImposedFlow, FLOWS]  # the type of a field that holds any of them
 
-__all__ = ["FLOWS", "Extension", "Flow", "ImposedFlow", "Shear", "Symbol", "Trap"]
+__all__ = ["FLOWS", "Extension", "Flow", "ImposedFlow", "Linear", "Shear", "Symbol", "Trap"]

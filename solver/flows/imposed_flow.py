@@ -42,13 +42,18 @@ class ImposedFlow(Model, ABC):
     odd : bool
         Whether velocity(−x) = −velocity(x) when the vesicles' centers are reflected, too.  Only then may a
         pair that a half turn leaves as it is be computed as one vesicle and its image.
-    rotates : bool
-        Whether the flow turns a pair, or a single vesicle, round and round.  Then a pair has a period and is
-        bound when it revolves; a single vesicle may tumble.  Everywhere it must turn lines of any direction
-        the same way, whose sense is read from the gradient at the origin.
-    strains : bool
-        Whether a pair comes to rest in the flow, side by side or end to end, with an inclination to the
-        diverging axis y.
+
+    Notes
+    -----
+    In a flow that `rotates` a pair has a period and is bound when it revolves; a single vesicle may tumble.
+    Everywhere it must turn lines of any direction the same way, whose sense is read from the gradient at the
+    origin.  Only one that `strains` as well may turn lines of some directions back.
+
+    In a flow that `strains` a pair that rests has an inclination to the axis y.  Along it lines must be
+    stretched fastest.
+
+    The `shear_rate` is that of the simple shear with the same rate of strain E, √(2 E:E).  Only a flow with
+    the same gradient everywhere may have one.
     """
 
     kind: str
@@ -57,8 +62,16 @@ class ImposedFlow(Model, ABC):
     title: ClassVar[str]
     symbols: ClassVar[Mapping[str, Symbol]]
     odd: ClassVar[bool] = False
-    rotates: ClassVar[bool] = False
-    strains: ClassVar[bool] = False
+
+    @property
+    def rotates(self) -> bool:
+        """Whether the flow turns a pair, or a single vesicle, round and round."""
+        return False
+
+    @property
+    def strains(self) -> bool:
+        """Whether a pair may come to rest in the flow, side by side or end to end."""
+        return False
 
     @abstractmethod
     def velocity(self, points: Array, centers: Array) -> Array:
@@ -118,7 +131,7 @@ class ImposedFlow(Model, ABC):
 
     @property
     def shear_rate(self) -> float | None:
-        """Shear rate du_x/dy by which a stress is divided to give a viscosity; None for other flows."""
+        """Shear rate by which a stress is divided to give a viscosity; None for flows that have none."""
         return None
 
     def effective_aspect_ratio(self, period: float) -> float | None:

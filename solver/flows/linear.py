@@ -1,68 +1,100 @@
-"""Flows whose velocity gradient is the same everywhere."""
+"""Any flow whose velocity gradient is the same everywhere: between extension, shear and rotation."""
 
 from __future__ import annotations
 
-from typing import ClassVar
+from collections.abc import Mapping
+from typing import ClassVar, Literal
 
 import numpy as np
+from pydantic import Field
 
-from solver.flows.imposed_flow import Array, ImposedFlow
+from solver.flows.imposed_flow import Array, ImposedFlow, Symbol
+from solver.flows.uniform_gradient import FollowingFlow, UniformGradient
 
 
-class LinearFlow(ImposedFlow):
-    """Velocity rate·A x with a constant matrix A.
+class Linear(UniformGradient):
+    """Velocity ε(−x, y) + ω(y, −x) with ε + ω = rate and ε − ω = flow_type·rate.
+
+    With the flow type 1 it is `Extension`, with 0 simple shear at that shear rate along x = y, with -1 a
+    clockwise rotation.  Up to a turn and a reflection of the axes every constant gradient of an
+    incompressible flow is one of these (Fuller & Leal 1980).
 
     Attributes
     ----------
-    unit_gradient : (2, 2)
-        The matrix A: the velocity gradient at a rate of 1.
+    rate : float
+        Sum of the rate of strain ε and the angular velocity ω, 1/time.
+    flow_type : float
+        (ε − ω)/(ε + ω), from -1 to 1.
     """
 
-    unit_gradient: ClassVar[Array]
-    odd: ClassVar[bool] = True
+    kind: Literal["linear"] = "linear"
+    flow_type: float = Field(0.0, ge=-1, le=1)
 
-    def velocity(self, points: Array, centers: Array) -> Array:
-        """Return the velocity at points.
+    title: ClassVar[str] = "linear flow"
+    symbols: ClassVar[Mapping[str, Symbol]] = {
+        "rate": Symbol("rate of strain plus rotation", "G", "G"),
+        "flow_type": Symbol("flow type", r"\alpha", "α"),
+    }
+
+    @property
+    def rate_of_strain(self) -> float:
+        """The rate ε at which lines along y are stretched, 1/time."""
+        return self.rate * (1 + self.flow_type) / 2
+
+    @property
+    def angular_velocity(self) -> float:
+        """That of the rotation, ω, clockwise, radians/time."""
+        return self.rate * (1 - self.flow_type) / 2
+
+    @property
+    def unit_gradient(self) -> Array:
+        """Strain and rotation together, (2, 2)."""
+        strain, rotation = (1 + self.flow_type) / 2, (1 - self.flow_type) / 2
+        return np.array([[-strain, rotation], [-rotation, strain]])
+
+    @property
+    def rotates(self) -> bool:
+        """Whether there is any rotation: a pair that is not slender revolves even if strain prevails."""
+        return self.flow_type < 1
+
+    @property
+    def strains(self) -> bool:
+        """Whether strain prevails: then lines of two directions do not turn."""
+        return self.flow_type > 0
+
+    @property
+    def comoving(self) -> ImposedFlow | None:
+        """The same about the mean of the centers, where strain prevails and carries vesicles away."""
+        return _FollowingLinear(rate=self.rate, flow_type=self.flow_type) if self.strains else None
+
+    @property
+    def shear_rate(self) -> float:
+        """Twice the rate of strain."""
+        return 2 * self.rate_of_strain
+
+    def effective_aspect_ratio(self, period: float) -> float | None:
+        """Return λ ≥ 1 of the rigid ellipse that turns with a period (Jeffery 1922).
+
+        With B = (λ² − 1)/(λ² + 1) the period is 2π/√(ω² − (εB)²).
 
         Parameters
         ----------
-        points : (2, ...)
-        centers : (2, C)
-            Of all vesicles; a linear flow does not follow them.
+        period : float
+            Duration of a full turn, in units of time.
 
         Returns
         -------
-        (2, ...)
+        float or None
+            None if no ellipse turns like that, or all do.
         """
-        flat = points.reshape(2, -1)
-        return np.asarray((self.rate * self.unit_gradient) @ flat).reshape(points.shape)
+        turning = 2 * np.pi / period
+        if not self.rate_of_strain or turning > self.angular_velocity:
+            return None
+        slenderness = np.sqrt(self.angular_velocity**2 - turning**2) / self.rate_of_strain
+        return float(np.sqrt((1 + slenderness) / (1 - slenderness))) if slenderness < 1 else None
 
-    def velocity_gradient(self, points: Array) -> Array:
-        """Return the velocity gradient at points, the same at all.
 
-        Parameters
-        ----------
-        points : (2, ...)
+class _FollowingLinear(FollowingFlow, Linear):
+    """The same flow about the mean of the vesicles' centers."""
 
-        Returns
-        -------
-        (2, 2, ...)
-        """
-        gradient = (self.rate * self.unit_gradient).reshape(2, 2, *(1 for _ in points.shape[1:]))
-        return np.broadcast_to(gradient, (2, *points.shape))
-
-    def jacobian(self, points: Array, by_state: Array, centers_by_state: Array) -> Array:
-        """Return the derivatives of the velocity at points by the state.
-
-        Parameters
-        ----------
-        points : (2, P)
-        by_state : (2, P, S)
-        centers_by_state : (2, C, S)
-
-        Returns
-        -------
-        (2, P, S)
-        """
-        gradient = self.rate * self.unit_gradient
-        return np.asarray(gradient @ by_state.reshape(2, -1)).reshape(by_state.shape)
+    kind: Literal["linear"] = "linear"

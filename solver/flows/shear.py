@@ -8,18 +8,28 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from solver.flows.imposed_flow import Array, Symbol
-from solver.flows.linear import LinearFlow
+from solver.flows.uniform_gradient import UniformGradient
+
+_UNIT_GRADIENT = np.array([[0.0, 1.0], [0.0, 0.0]])
 
 
-class Shear(LinearFlow):
+class Shear(UniformGradient):
     """Velocity rate·(y, 0) (Quaife et al. 2019, section V)."""
 
     kind: Literal["shear"] = "shear"
 
     title: ClassVar[str] = "shear flow"
     symbols: ClassVar[Mapping[str, Symbol]] = {"rate": Symbol("shear rate", r"\dot{\gamma}", "γ̇")}
-    rotates: ClassVar[bool] = True
-    unit_gradient: ClassVar[Array] = np.array([[0.0, 1.0], [0.0, 0.0]])
+
+    @property
+    def unit_gradient(self) -> Array:
+        """du_x/dy alone, (2, 2)."""
+        return _UNIT_GRADIENT
+
+    @property
+    def rotates(self) -> bool:
+        """True: clockwise."""
+        return True
 
     @property
     def shear_rate(self) -> float:

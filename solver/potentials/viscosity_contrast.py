@@ -98,15 +98,18 @@ class ViscosityContrast:
         """
         return self._double_layer.jacobian(geometry, velocity * self._excess[:, None])
 
-    def stress(self, geometry: Geometry, velocity: Array) -> float:
-        """Return the shear stress that the contrast adds, ∫ (λ − 1)(u_x n_y + u_y n_x) ds, n outward.
+    def stress(self, geometry: Geometry, velocity: Array, gradient: Array) -> float:
+        """Return the stress that the contrast adds, ∫ (λ − 1) u · (D + Dᵀ) n ds, n outward.
 
-        The fluid inside has the stress of its own viscosity (Batchelor 1970).
+        The fluid inside has the stress of its own viscosity (Batchelor 1970).  In shear it is
+        ∫ (λ − 1)(u_x n_y + u_y n_x) ds.
 
         Parameters
         ----------
         geometry : Geometry
         velocity : (2, M, N)
+        gradient : (2, 2)
+            D, the imposed velocity gradient over the shear rate.
 
         Returns
         -------
@@ -114,7 +117,8 @@ class ViscosityContrast:
             Over all membranes, images included.
         """
         membranes, inward = geometry.membranes, geometry.normals
-        strain = np.sum(velocity[0] * inward[1] + velocity[1] * inward[0], axis=1)
+        along = ((gradient + gradient.T) @ inward.reshape(2, -1)).reshape(inward.shape)
+        strain = np.sum(velocity[0] * along[0] + velocity[1] * along[1], axis=1)
         return float(membranes.multiplicity * np.sum(self._excess * strain * membranes.spacing))
 
     def _solve(self, right: Array) -> Array:

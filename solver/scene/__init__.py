@@ -1,6 +1,6 @@
 """What is simulated: validated, frozen models of vesicles, flow, adhesion, numerics and criteria."""
 
-from solver.flows import Extension, Flow, Shear, Trap
+from solver.flows import Extension, Flow, Linear, Shear, Trap
 from solver.model import Model, NonNegative, Positive
 from solver.pair_potentials import Adhesion, PairPotential, PowerLaw
 from solver.scene.arrangement import Arrangement
@@ -19,6 +19,7 @@ __all__ = [
     "Criteria",
     "Extension",
     "Flow",
+    "Linear",
     "Model",
     "NonNegative",
     "Numerics",

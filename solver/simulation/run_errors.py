@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.analysis.answer_errors import change_of
-from solver.analysis.averages import pair_inclination
+from solver.analysis.averages import is_at_rest, pair_inclination, revolves
 from solver.analysis.diagnostics import measures
 from solver.analysis.run import Errors, Outcome
 from solver.analysis.state_error import magnitude, position_error
@@ -59,7 +59,7 @@ def _inclination_error(scene: Scene, loop: TimeLoop, error: Array) -> float | No
     if tracker is None or scene.flow is None:
         return None
     one = len(scene.vesicles) == 1
-    if not one and not scene.flow.strains:
+    if not one and (not scene.flow.strains or revolves(scene, tracker)):
         return None
 
     def angle(state: Array) -> float:
@@ -80,6 +80,6 @@ def _viscosity_error(scene: Scene, loop: TimeLoop, error: Array, outcome: Outcom
         motion = equation.motion(state)
         return sum(part(motion) for part in parts)
 
-    if outcome is Outcome.STEADY:
+    if is_at_rest(scene, outcome, loop.tracker):
         return magnitude(change_of(total, loop.state, error))
     return loop.answer_errors.of_average(total)

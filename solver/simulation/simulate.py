@@ -369,7 +369,7 @@ def _finished(
         period=period,
         settled=loop.settled if period else None,
         effective_aspect_ratio=flow.effective_aspect_ratio(period) if flow and period else None,
-        inclination_angle=averages.inclination(scene, series),
+        inclination_angle=averages.inclination(scene, series, loop.tracker),
         gap=float(series["gap"][-1]) if "gap" in series else None,
         viscosity=averages.viscosity(scene, series, outcome, loop.tracker, loop.viscosities),
         energy=Energy(

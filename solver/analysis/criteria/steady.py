@@ -47,7 +47,7 @@ class Steady(Criterion):
 
     @classmethod
     def applies_to(cls, scene: Scene) -> bool:
-        """Return whether the scene may come to rest: all but a pair that revolves.
+        """Return whether the scene may come to rest: all but a pair that the flow always turns.
 
         Parameters
         ----------
@@ -57,7 +57,8 @@ class Steady(Criterion):
         -------
         bool
         """
-        return not Revolved.applies_to(scene)
+        flow = scene.imposed_flow
+        return (flow is not None and flow.strains) or not Revolved.applies_to(scene)
 
     def begin(self, history: History) -> None:
         """Compare what follows with this state, which may have been resampled or perturbed.

@@ -6,14 +6,17 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from solver.flows import FLOWS, Extension, ImposedFlow, Shear, Trap
+from solver.flows import FLOWS, Extension, ImposedFlow, Linear, Shear, Trap
 
 Array = NDArray[np.float64]
 RANDOM = np.random.default_rng(5)
 POINTS = 3 * RANDOM.standard_normal((2, 4, 7))
 CENTERS = RANDOM.standard_normal((2, 3))
 
-every_flow = pytest.mark.parametrize("flow", [flow(rate=0.7) for flow in FLOWS], ids=lambda flow: flow.kind)
+FLOW_TYPES = (-1.0, -0.4, 0.0, 0.3, 1.0)
+LINEAR = [Linear(rate=0.7, flow_type=flow_type) for flow_type in FLOW_TYPES]
+MANY = [*(flow(rate=0.7) for flow in FLOWS), *LINEAR, *(each.comoving for each in LINEAR if each.comoving)]
+every_flow = pytest.mark.parametrize("flow", MANY, ids=lambda flow: flow.kind)
 
 
 def test_shear() -> None:
@@ -42,6 +45,62 @@ def test_the_trap_follows_the_vesicles() -> None:
     )
     np.testing.assert_allclose(trap, 0, atol=1e-14)
     assert np.max(np.abs(extension)) > 1
+
+
+def test_a_linear_flow_of_type_1_is_extension() -> None:
+    linear, extension = Linear(rate=0.7, flow_type=1.0), Extension(rate=0.7)
+    assert np.array_equal(linear.velocity(POINTS, CENTERS), extension.velocity(POINTS, CENTERS))
+    assert linear.comoving
+    assert extension.comoving
+    np.testing.assert_allclose(
+        linear.comoving.velocity(POINTS, CENTERS),
+        extension.comoving.velocity(POINTS, CENTERS),
+        rtol=0,
+        atol=1e-14,
+    )
+
+
+def test_a_linear_flow_of_type_0_is_shear_along_x_equal_to_y() -> None:
+    along, across = np.array([1.0, 1.0]) / np.sqrt(2), np.array([-1.0, 1.0]) / np.sqrt(2)
+    height = np.einsum("i,ijk->jk", across, POINTS)
+    expected = 0.7 * height * along[:, None, None]
+    np.testing.assert_allclose(Linear(rate=0.7).velocity(POINTS, CENTERS), expected, rtol=0, atol=1e-14)
+
+
+def test_a_linear_flow_of_type_minus_1_turns_clockwise() -> None:
+    x, y = POINTS
+    rotation = Linear(rate=0.7, flow_type=-1.0)
+    np.testing.assert_allclose(rotation.velocity(POINTS, CENTERS), [0.7 * y, -0.7 * x], rtol=1e-15)
+    assert not rotation.shear_rate
+
+
+@pytest.mark.parametrize("flow", LINEAR, ids=lambda flow: str(flow.flow_type))
+def test_strain_and_rotation_of_a_linear_flow(flow: Linear) -> None:
+    gradient = flow.velocity_gradient(np.zeros(2))
+    strain = (gradient + gradient.T) / 2
+    assert flow.rate_of_strain + flow.angular_velocity == pytest.approx(flow.rate, rel=1e-15)
+    assert flow.rate_of_strain - flow.angular_velocity == pytest.approx(flow.flow_type * flow.rate, abs=1e-15)
+    np.testing.assert_allclose(strain, flow.rate_of_strain * np.diag([-1, 1]), atol=1e-15)
+    assert (gradient[0, 1] - gradient[1, 0]) / 2 == pytest.approx(flow.angular_velocity, abs=1e-15)
+    assert flow.shear_rate == pytest.approx(np.sqrt(2 * np.sum(strain**2)), abs=1e-15)
+
+
+@pytest.mark.parametrize("flow_type", [-0.4, 0.0, 0.3])
+def test_the_aspect_ratio_is_that_of_the_rigid_ellipse_with_the_period(flow_type: float) -> None:
+    """Its angle is integrated around the circle (Jeffery 1922)."""
+    flow, ratio = Linear(rate=0.7, flow_type=flow_type), 1.6
+    slenderness = (ratio**2 - 1) / (ratio**2 + 1)
+    angle = 2 * np.pi * np.arange(400) / 400
+    turning = flow.angular_velocity - slenderness * flow.rate_of_strain * np.sin(2 * angle)
+    period = 2 * np.pi * np.mean(1 / turning)
+    assert flow.effective_aspect_ratio(period) == pytest.approx(ratio, rel=1e-10)
+    assert flow.effective_aspect_ratio(0.9 * 2 * np.pi / flow.angular_velocity) is None
+
+
+def test_the_aspect_ratio_in_linear_flow_is_that_in_shear() -> None:
+    in_shear = Shear(rate=0.7).effective_aspect_ratio(25.0)
+    assert Linear(rate=0.7).effective_aspect_ratio(25.0) == pytest.approx(in_shear, rel=1e-12)
+    assert Linear(rate=0.7, flow_type=1.0).effective_aspect_ratio(25.0) is None
 
 
 @every_flow
@@ -105,7 +164,7 @@ def test_a_flow_that_says_so_is_odd(flow: ImposedFlow) -> None:
 
 @every_flow
 def test_a_flow_that_rotates_turns_all_lines_the_same_way(flow: ImposedFlow) -> None:
-    """Criteria read direction and sense from the gradient at the origin."""
+    """Criteria read direction and sense from the gradient at the origin.  Strain may hold some lines."""
     angles = np.linspace(0, np.pi, 50)
     along, across = np.stack([np.cos(angles), np.sin(angles)]), np.stack([-np.sin(angles), np.cos(angles)])
     origin = np.zeros((2, 1))
@@ -113,7 +172,24 @@ def test_a_flow_that_rotates_turns_all_lines_the_same_way(flow: ImposedFlow) -> 
     elsewhere = np.einsum("ia,ijp,ja->ap", across, flow.velocity_gradient(POINTS.reshape(2, -1)), along)
     sense = np.sign(turning.flat[np.argmax(np.abs(turning))])
     turns_alike = sense != 0 and bool(np.all(sense * elsewhere >= -1e-14))
-    assert turns_alike or not flow.rotates
+    assert turns_alike or not flow.rotates or flow.strains
+    assert sense * turning.sum() > 0 or not flow.rotates
+
+
+@every_flow
+def test_a_flow_that_strains_stretches_lines_along_y_fastest(flow: ImposedFlow) -> None:
+    gradient = flow.velocity_gradient(np.zeros(2))
+    assert np.allclose((gradient + gradient.T)[:, 1], [0, 2 * gradient[1, 1]]) or not flow.strains
+    assert gradient[1, 1] > 0 or not flow.strains
+
+
+@every_flow
+def test_a_viscosity_divides_by_the_shear_rate_of_the_same_strain(flow: ImposedFlow) -> None:
+    if flow.shear_rate is None:
+        return
+    gradient = flow.velocity_gradient(POINTS.reshape(2, -1))
+    strain = (gradient + gradient.swapaxes(0, 1)) / 2
+    np.testing.assert_allclose(np.sqrt(2 * np.sum(strain**2, axis=(0, 1))), flow.shear_rate, atol=1e-14)
 
 
 @every_flow

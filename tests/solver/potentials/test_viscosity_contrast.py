@@ -102,7 +102,7 @@ def test_the_stress_is_that_of_the_far_flow() -> None:
     force = motion.bending + geometry.arclength_derivative(motion.tension * geometry.tangents)
     assert dynamics.contrast
     spacing = geometry.membranes.spacing
-    stress = dynamics.contrast.stress(geometry, motion.velocity)
+    stress = dynamics.contrast.stress(geometry, motion.velocity, np.array([[0.0, 1.0], [0.0, 0.0]]))
     stress -= float(np.sum(force[0] * geometry.points[1] * spacing[:, None]))
     points, force, velocity = (each.reshape(2, -1) for each in (geometry.points, force, motion.velocity))
     outward = -geometry.normals.reshape(2, -1)
