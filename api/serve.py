@@ -24,6 +24,7 @@ from api.database.service_database import Database, look_up_for
 from api.http.bounded_protocol import ConnectionLimits, bounded_protocol
 from api.http.open_streams import OpenStreams
 from api.http.rate_limits import RateLimits
+from api.jobs.expected_times import ExpectedTimes
 from api.jobs.job_queue import Jobs
 from api.jobs.submissions import Submissions, job_limits
 from api.routes.service import Service
@@ -100,6 +101,7 @@ def open_service(settings: Settings) -> Iterator[Service]:
             store=store,
             jobs=Jobs(database, store.path),
             submissions=Submissions(job_limits(settings)),
+            expected_times=ExpectedTimes(store),
             # Kept for less time than a listener waits, so no listener receives an older state than before.
             watched_jobs=TTLCache(WATCHED_JOBS, ttl=settings.event_seconds / 2),
             tokens=tokens,

@@ -153,8 +153,8 @@ class Dimension:
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
-        """Describe the number, or the text of one with a unit."""
-        return or_quantity(handler(schema), handler.mode)
+        """Describe the number, or the text of one with a unit; ``x-unit`` is the unit of the number."""
+        return or_quantity(handler(schema), handler.mode) | {"x-unit": self.symbol}
 
 
 def or_quantity(number: JsonSchemaValue, mode: str) -> JsonSchemaValue:

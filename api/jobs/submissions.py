@@ -78,6 +78,11 @@ class Estimate(BaseModel):
     ----------
     runs : int
         How many runs.
+    ranks : int
+        How many processes the job uses.
+    seconds : float or None
+        How long the runs are likely to take on these processes, as the newest runs of the store with as many
+        vesicles in such a flow did; null if there are none.
     cost : float
         Points × vesicles × time to simulate, over all runs.
     maximum : float
@@ -95,6 +100,8 @@ class Estimate(BaseModel):
     """
 
     runs: int
+    ranks: int = 1
+    seconds: float | None = None
     cost: float
     maximum: float
     recorded: float
@@ -172,6 +179,43 @@ def estimate(question: Question[Any], limits: JobLimits) -> Estimate:
             cost.work <= limits.cost and cost.recorded <= limits.recorded and cost.memory <= limits.memory
         ),
     )
+
+
+def usual_ranks(question: Question[Any], estimate: Estimate, settings: Settings) -> int:
+    """Return how many processes a job uses that does not say how many.
+
+    Parameters
+    ----------
+    question : Question
+        What the job answers.
+    estimate : Estimate
+        Of the question.
+    settings : Settings
+        That limit ranks and memory.
+
+    Returns
+    -------
+    int
+        As many as it may, for a question of many runs.
+    """
+    return max(most_ranks(estimate, settings), 1) if question.has_many_runs else 1
+
+
+def most_ranks(estimate: Estimate, settings: Settings) -> int:
+    """Return how many processes a job may use.
+
+    Parameters
+    ----------
+    estimate : Estimate
+        Of the question.
+    settings : Settings
+        That limit ranks and memory.
+
+    Returns
+    -------
+    int
+    """
+    return min(settings.maximum_ranks, int(estimate.most_memory // estimate.memory))
 
 
 class PresetDocument(BaseModel):

@@ -7,11 +7,12 @@ import logging
 from collections.abc import AsyncIterator
 from http import HTTPStatus
 from pathlib import Path as FilePath
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Header, Path, Query, Request, Response
 from fastapi.responses import PlainTextResponse
 from fastapi.sse import EventSourceResponse, ServerSentEvent
+from starlette.concurrency import run_in_threadpool
 
 from api.auth import TokenScope
 from api.http.caching import json_response
@@ -19,7 +20,7 @@ from api.http.openapi import reference
 from api.http.paging import CollectionPage, Limit, page_response
 from api.http.problems import OUTAGES, Problem, documented, unavailable
 from api.jobs.job import Job, JobStatus, NoSuchJob, TooManyJobs
-from api.jobs.submissions import CheckedSubmission, Estimate, Submission
+from api.jobs.submissions import CheckedSubmission, Estimate, Submission, most_ranks, usual_ranks
 from api.routes.service import Reader, Service, Submitter
 from api.settings import Settings
 from ensemble.errors import BadInput
@@ -69,7 +70,7 @@ JsonBody = Annotated[bytes, Depends(read_json_body)]
 
 @router.post("/estimate", openapi_extra=SUBMISSION_BODY, responses=UNSUPPORTED_MEDIA_TYPE)
 async def estimate_cost(reader: Reader, body: JsonBody) -> Estimate:
-    """Give an upper bound of the cost of a job without submitting it.
+    """Give an upper bound of the cost of a job, and the time that it is likely to take, without making it.
 
     Parameters
     ----------
@@ -86,7 +87,10 @@ async def estimate_cost(reader: Reader, body: JsonBody) -> Estimate:
     BadInput
         If a field is invalid; the message names it.
     """
-    return (await reader.service.submissions.read(body)).estimate
+    service = reader.service
+    checked = await service.submissions.read(body)
+    ranks = checked.submission.ranks or usual_ranks(checked.question, checked.estimate, service.settings)
+    return await run_in_threadpool(service.expected_times.added, checked.estimate, checked.question, ranks)
 
 
 @router.post(
@@ -179,14 +183,14 @@ def _resources(settings: Settings, checked: CheckedSubmission) -> tuple[int, flo
             cost=cost.cost,
             maximum=cost.maximum,
         )
-    most_ranks = min(settings.maximum_ranks, int(cost.most_memory // cost.memory))
-    ranks = checked.submission.ranks or (most_ranks if checked.question.has_many_runs else 1)
+    most = most_ranks(cost, settings)
+    ranks = checked.submission.ranks or usual_ranks(checked.question, cost, settings)
     seconds = checked.submission.seconds or settings.maximum_seconds
     if ranks > settings.maximum_ranks:
         raise BadInput(f"ranks: {ranks} — must be at most {settings.maximum_ranks}")
-    if ranks > most_ranks:
+    if ranks > most:
         raise BadInput(
-            f"ranks: {ranks} — must be at most {most_ranks}: each needs {cost.memory:.3g} bytes of the "
+            f"ranks: {ranks} — must be at most {most}: each needs {cost.memory:.3g} bytes of the "
             f"{cost.most_memory:.3g} that a job may use"
         )
     if seconds > settings.maximum_seconds:
@@ -258,6 +262,30 @@ async def get_job(reader: Reader, identifier: JobKey) -> Response:
     """
     record = await reader.service.look_up(reader.service.jobs.records.one, identifier)
     return json_response(record.json)
+
+
+@router.get("/jobs/{identifier}/submission", responses=NO_SUCH_JOB)
+def get_submission(reader: Reader, identifier: JobKey) -> dict[str, Any]:
+    """Give the document that makes the same job when it is submitted.
+
+    Parameters
+    ----------
+    reader : Caller
+    identifier : str
+
+    Returns
+    -------
+    dict
+        JSON of a `Submission`.
+
+    Raises
+    ------
+    NoSuchJob
+        If there is no such job.
+    """
+    jobs = reader.service.jobs
+    job = jobs.get(identifier)
+    return {job.kind: jobs.document(job), "ranks": job.ranks, "seconds": job.seconds}
 
 
 @router.delete("/jobs/{identifier}", responses=NO_SUCH_JOB)

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from http import HTTPStatus
 from typing import Any, Self
 
 from fastapi import APIRouter
 from pydantic import BaseModel
+from starlette.exceptions import HTTPException
 
 from api.http.paging import CollectionPage
+from api.http.problems import documented
+from api.jobs.job import KindName
 from api.routes.service import Reader
-from ensemble.questions import Question, kinds
+from ensemble.config.document_schema import document_schema
+from ensemble.questions import Question, kind_named, kinds
 
 router = APIRouter(prefix="/kinds", tags=["kinds"])
 
@@ -75,3 +80,22 @@ def list_kinds(reader: Reader) -> CollectionPage[KindDescription]:
     CollectionPage
     """
     return CollectionPage(items=[KindDescription.of(kind) for kind in kinds()], next=None)
+
+
+@router.get("/{kind}/schema", responses=documented(HTTPStatus.NOT_FOUND))
+def get_schema(reader: Reader, kind: KindName) -> dict[str, Any]:
+    """Give the JSON Schema of the documents of a kind: fields with descriptions, units and allowed values.
+
+    Parameters
+    ----------
+    reader : Caller
+    kind : str
+
+    Returns
+    -------
+    dict
+    """
+    try:
+        return document_schema(kind_named(kind).document_type)
+    except ValueError as error:
+        raise HTTPException(HTTPStatus.NOT_FOUND, str(error)) from error

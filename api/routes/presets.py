@@ -6,9 +6,8 @@ from fastapi import APIRouter
 from pydantic import TypeAdapter
 
 from api.http.paging import CollectionPage
-from api.jobs.submissions import PresetDocument, estimate, job_limits
-from api.routes.service import Reader
-from api.settings import Settings
+from api.jobs.submissions import PresetDocument, estimate, job_limits, usual_ranks
+from api.routes.service import Reader, Service
 from ensemble.config.documents import preset_document, preset_names
 from ensemble.questions import preset_question
 from solver.scene.arrangement import Arrangement
@@ -28,11 +27,10 @@ def list_presets(reader: Reader) -> CollectionPage[PresetDocument]:
     -------
     CollectionPage
     """
-    settings = reader.service.settings
-    return CollectionPage(items=[_preset(name, settings) for name in preset_names()], next=None)
+    return CollectionPage(items=[_preset(name, reader.service) for name in preset_names()], next=None)
 
 
-def _preset(name: str, settings: Settings) -> PresetDocument:
+def _preset(name: str, service: Service) -> PresetDocument:
     question = preset_question(name, {})
     document = question.fields
     arrangement = preset_document(name).get("arrangement")
@@ -42,9 +40,11 @@ def _preset(name: str, settings: Settings) -> PresetDocument:
         )
         document = {key: value for key, value in document.items() if key != "vesicles"}
         document["arrangement"] = complete
+    cost = estimate(question, job_limits(service.settings))
+    ranks = usual_ranks(question, cost, service.settings)
     return PresetDocument(
         name=name,
         kind=question.kind,
         document=document,
-        estimate=estimate(question, job_limits(settings)),
+        estimate=service.expected_times.added(cost, question, ranks),
     )

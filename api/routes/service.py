@@ -16,6 +16,7 @@ from api.auth.tokens import Tokens
 from api.database.service_database import LookUp
 from api.http.open_streams import OpenStreams
 from api.http.rate_limits import RateLimits
+from api.jobs.expected_times import ExpectedTimes
 from api.jobs.job_queue import Jobs
 from api.jobs.submissions import Submissions
 from api.settings import Settings
@@ -35,6 +36,8 @@ class Service:
         The queue of jobs.
     submissions : Submissions
         Checks submitted documents.
+    expected_times : ExpectedTimes
+        How long jobs are likely to take.
     watched_jobs : TTLCache
         Recently read jobs by their identifiers, shared by all clients that listen to events.
     tokens : Tokens
@@ -51,6 +54,7 @@ class Service:
     store: Store
     jobs: Jobs
     submissions: Submissions
+    expected_times: ExpectedTimes
     watched_jobs: TTLCache[str, Record]
     tokens: Tokens
     limits: RateLimits

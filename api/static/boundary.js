@@ -110,7 +110,13 @@ class BoundaryView {
     this.heading.replaceChildren(
       element("h1", {}, titleOf(boundary)),
       element("span", { class: `state ${state.name}`, role: "status" }, state.text),
-      element("p", {}, `${words(boundary.name)}: ${describe(scene, [sweep.parameter, search.parameter])}`),
+      element("a", { class: "button", href: `#/new?boundary=${boundary.study_key}` }, "Trace again with changes"),
+      element(
+        "p",
+        {},
+        element("code", {}, boundary.name),
+        `: ${describe(scene, [sweep.parameter, search.parameter])}`,
+      ),
     );
     this.figure.setAttribute("aria-label", summary(boundary, marks));
     void this.plot.draw(() => phaseDiagram(boundary, marks));

@@ -4,19 +4,28 @@ import { sceneIn } from "./kinds.js";
 import { quantity } from "./symbols.js";
 
 /** @typedef {import("./kinds.js").Kind} Kind */
+/** @typedef {import("./schema.js").Schema} Schema */
 
 /**
  * @typedef {object} Field
  * @property {string} path
  * @property {unknown} value
  * @property {string} label
+ * @property {string} help - What it is, in the words of the model.
+ * @property {string} unit
+ * @property {string[] | null} choices - All values of a text that has a few.
  * @property {boolean} isPrincipal - One of those that people change most.
+ *
+ * @typedef {object} Union - A table that is one of several kinds, such as the flow.
+ * @property {string} path
+ * @property {any} value - The table, null if there is none.
+ * @property {string} label
+ * @property {string} help
+ * @property {string[]} kinds
+ * @property {boolean} isOptional
  */
 
 const OF_SCENE = [
-  "flow.rate",
-  "adhesion.hamaker",
-  "adhesion.distance",
   "vesicles.reduced_area",
   "arrangement.count",
   "arrangement.area_fraction",
@@ -25,10 +34,14 @@ const OF_SCENE = [
   "horizon",
   "numerics.points",
   "numerics.tolerance",
+  "numerics.integrator",
 ];
+const NAME = "name";
 const VARIED = /(?:^|\.)parameter$/;
 const LABELS = /** @type {Record<string, string>} */ ({
-  horizon: "time to simulate",
+  flow: "imposed flow",
+  adhesion: "adhesion potential",
+  horizon: "latest end",
   "numerics.points": "points on each vesicle",
   "numerics.tolerance": "tolerance in time",
   "arrangement.count": "number of vesicles",
@@ -41,46 +54,141 @@ const LABELS = /** @type {Record<string, string>} */ ({
   "search.certify": "certify the brackets",
 });
 
-/**
- * @param {any} document - In full.
- * @param {Kind} kind - Which kind of question it asks.
- * @returns {Field[]} The principal ones first, in the order in which people think of them.
- */
-export function fieldsOf(document, kind) {
-  const all = leaves(document);
-  const prefix = kind.scene_path ? `${kind.scene_path}.` : "";
-  // A field called `parameter` names the field of the scene that the question itself varies.
-  const varied = all.filter(([path]) => VARIED.test(path)).map(([, name]) => `${prefix}${name}`);
-  const ofScene = OF_SCENE.map((path) => prefix + path);
-  const principal = [...kind.principal_fields, ...ofScene].filter((path) => !varied.includes(path));
-  const rank = (/** @type {Field} */ { path }) =>
-    principal.includes(path) ? principal.indexOf(path) : principal.length;
+/** The document of a form, and what the service says about its fields. */
+export class FormDocument {
+  /**
+   * @param {any} document - In full.
+   * @param {Kind} kind - Which kind of question it asks.
+   * @param {Schema} schema
+   */
+  constructor(document, kind, schema) {
+    this.document = schema.completed(document);
+    this.kind = kind;
+    this.schema = schema;
+    this.prefix = kind.scene_path ? `${kind.scene_path}.` : "";
+  }
 
-  return all
-    .filter(([path]) => !varied.includes(path))
-    .map(([path, value]) => ({
+  /** The scene in the document. */
+  get scene() {
+    return sceneIn(this.document, this.kind);
+  }
+
+  /** Tables that are one of several kinds. @returns {Union[]} */
+  get unions() {
+    // Vesicles replace an arrangement, so its kind is not a choice of its own.
+    const isArrangement = (/** @type {string} */ path) => path === `${this.prefix}arrangement`;
+    return this.schema
+      .unions(this.prefix, this.document)
+      .filter(({ path }) => !isArrangement(path))
+      .map((union) => ({
+        ...union,
+        value: valueOf(this.document, union.path) ?? null,
+        label: this.#label(union.path),
+        help: this.schema.describe(union.path, this.document).help,
+      }));
+  }
+
+  /** All other fields, the principal ones first, in the order in which people think of them. @returns {Field[]} */
+  get fields() {
+    const unions = this.unions.map(({ path }) => path);
+    const isInside = (/** @type {string} */ path) =>
+      unions.some((union) => path === union || path.startsWith(`${union}.`));
+    const ofScene = OF_SCENE.map((path) => this.prefix + path);
+    const principal = [NAME, ...this.kind.principal_fields, ...ofScene];
+    const rank = (/** @type {Field} */ { path }) =>
+      principal.includes(path) ? principal.indexOf(path) : principal.length;
+    return leaves(this.document)
+      .filter(([path]) => !isInside(path) && !this.#varied.includes(path))
+      .map(([path, value]) => this.#field(path, value, principal.includes(path)))
+      .sort((first, second) => rank(first) - rank(second));
+  }
+
+  /**
+   * The fields of a table that is one of several kinds.
+   *
+   * @param {string} path
+   * @param {any} table
+   * @returns {Field[]}
+   */
+  fieldsOf(path, table) {
+    return leaves(table, path)
+      .filter(([inside]) => !inside.endsWith(".kind") && !this.#varied.includes(inside))
+      .map(([inside, value]) => this.#field(inside, value, true, table));
+  }
+
+  /** Fields of the scene that the question itself varies: a field called `parameter` names each. */
+  get #varied() {
+    return leaves(this.document)
+      .filter(([path]) => VARIED.test(path))
+      .map(([, name]) => `${this.prefix}${name}`);
+  }
+
+  /**
+   * @param {string} path
+   * @param {unknown} value
+   * @param {boolean} isPrincipal
+   * @param {any} [table] - The table of a union that the field is in.
+   * @returns {Field}
+   */
+  #field(path, value, isPrincipal, table) {
+    const union = path.slice(0, path.lastIndexOf("."));
+    const document = table ? replaced(this.document, union, table) : this.document;
+    return {
       path,
       value,
-      label: label(path, prefix, new Map(all), sceneIn(document, kind)),
-      isPrincipal: principal.includes(path),
-    }))
-    .sort((first, second) => rank(first) - rank(second));
+      label: this.#label(path, document),
+      isPrincipal,
+      ...this.schema.describe(path, document),
+    };
+  }
+
+  /**
+   * @param {string} path
+   * @param {any} [document]
+   */
+  #label(path, document = this.document) {
+    const values = new Map(leaves(document));
+    const varied = path.endsWith("values") ? values.get(path.replace(/values$/, "parameter")) : undefined;
+    const scene = sceneIn(document, this.kind);
+    if (typeof varied === "string") {
+      return `values of the ${quantity(varied, scene).name}`;
+    }
+    const inScene = path.startsWith(this.prefix) ? path.slice(this.prefix.length) : path;
+    const { name, symbol } = quantity(inScene, scene);
+    return LABELS[inScene] ?? (name === symbol ? inWords(path) : `${name} ${symbol}`);
+  }
 }
 
 /**
+ * The name of a field in words; of one of several tables, with the table.
+ *
  * @param {string} path
- * @param {string} prefix - Of the paths in the scene.
- * @param {Map<string, unknown>} values - All of the document, by path.
- * @param {any} scene
  */
-function label(path, prefix, values, scene) {
-  const varied = path.endsWith("values") ? values.get(path.replace(/values$/, "parameter")) : undefined;
-  if (typeof varied === "string") {
-    return `values of the ${quantity(varied, scene).name}`;
-  }
-  const inScene = path.startsWith(prefix) ? path.slice(prefix.length) : path;
-  const { name, symbol } = quantity(inScene, scene);
-  return LABELS[inScene] ?? (name === symbol ? path : `${name} ${symbol}`);
+function inWords(path) {
+  const names = path.split(".");
+  const name = names[names.length - 1].replaceAll("_", " ");
+  return /^\d+$/.test(names[names.length - 2] ?? "") ? `${name}, ${names.slice(-3, -1).join(" ")}` : name;
+}
+
+/**
+ * @param {any} document
+ * @param {string} path - Of tables only.
+ */
+function valueOf(document, path) {
+  return path.split(".").reduce((table, name) => table?.[name], document);
+}
+
+/**
+ * Return a document with another table at a path.
+ *
+ * @param {any} document
+ * @param {string} path
+ * @param {any} table
+ * @returns {any}
+ */
+function replaced(document, path, table) {
+  const [name, ...rest] = path.split(".");
+  return { ...document, [name]: rest.length > 0 ? replaced(document[name], rest.join("."), table) : table };
 }
 
 /**

@@ -70,6 +70,27 @@ export function duration(seconds) {
     : `${Math.floor(minutes / 60)} h ${minutes % 60} min`;
 }
 
+/**
+ * Write how long something takes that is known roughly.
+ *
+ * @param {number} seconds
+ * @returns {string}
+ */
+export function roughly(seconds) {
+  if (seconds < 10) {
+    return "some seconds";
+  }
+  /** @type {[string, number][]} */
+  const units = [
+    ["s", 1],
+    ["min", 60],
+    ["h", 3600],
+    ["days", 86400],
+  ];
+  const [name, length] = units.filter(([, each]) => seconds >= 1.5 * each).pop() ?? units[0];
+  return `${number(seconds / length, seconds / length < 100 ? 2 : 3)} ${name}`;
+}
+
 const moments = new Intl.DateTimeFormat(undefined, { dateStyle: "medium", timeStyle: "short" });
 
 /**

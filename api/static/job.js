@@ -1,9 +1,10 @@
 /** Elements that show the state of a job. */
 
-import { remove } from "./api.js";
+import { get, post, remove } from "./api.js";
 import { element } from "./dom.js";
 import { kindNamed } from "./kinds.js";
 import { alertAbout } from "./problems.js";
+import { goTo } from "./router.js";
 
 /**
  * @typedef {object} Job
@@ -70,4 +71,31 @@ export function cancelButton(job) {
     }
   });
   return button;
+}
+
+/**
+ * Make the ways to ask again what a job asked that has finished: the same once more, unless it has been answered, or
+ * with changes.
+ *
+ * @param {Job} job
+ */
+export function againButtons(job) {
+  if (isUnfinished(job)) {
+    return null;
+  }
+  const changed = element("a", { class: "button", href: `#/new?job=${job.id}` }, "Submit with changes");
+  if (job.status === "succeeded") {
+    return [changed];
+  }
+  const again = element("button", { class: "primary" }, "Submit again");
+  again.addEventListener("click", async () => {
+    again.disabled = true;
+    try {
+      const submission = await get(`/jobs/${job.id}/submission`, new AbortController().signal);
+      goTo(`/jobs/${(await post("/jobs", submission)).id}`);
+    } catch (error) {
+      again.replaceWith(alertAbout(error));
+    }
+  });
+  return [again, changed];
 }

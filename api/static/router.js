@@ -46,14 +46,19 @@ export function startRouter(routes) {
     document.title = "Vesicle ensemble";
     content.replaceChildren();
     if (!route) {
-      content.replaceChildren(element("h1", {}, "Page not found"), element("p", {}, path));
+      document.title = "Page not found – Vesicle ensemble";
+      content.replaceChildren(
+        element("h1", {}, "Page not found"),
+        element("p", {}, "There is nothing at ", element("code", {}, path), "."),
+        wayBack("boundaries"),
+      );
       return;
     }
     try {
       await route.show({ content, query, signal, parameters: { ...route.path.exec(path)?.groups } });
     } catch (error) {
       if (!signal.aborted) {
-        content.append(alertAbout(error));
+        content.append(alertAbout(error), wayBack(route.section));
       }
     }
   }
@@ -68,6 +73,12 @@ export function startRouter(routes) {
     content.focus();
   });
   void show();
+}
+
+/** @param {string} section - To which a link leads. */
+function wayBack(section) {
+  const name = document.querySelector(`nav a[href="#/${section}"]`)?.textContent ?? section;
+  return element("p", {}, element("a", { class: "button", href: `#/${section}` }, `Back to ${name.toLowerCase()}`));
 }
 
 /** @param {string | undefined} section */

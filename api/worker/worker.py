@@ -122,6 +122,7 @@ class Worker:
             self._futile[job.id] += 1
             self._try_again_later(lease, stop, f"could not be started ({error.strerror})")
             return
+        self._log(lease).add(f"attempt {job.attempts}, ranks: {job.ranks}")
         with Process(command, self._log(lease)) as process:
             status = self._wait(process, lease, stop)
             if status is None:
@@ -221,6 +222,7 @@ class Worker:
 
     def _finish(self, lease: Lease, stop: threading.Event, result: JobResult) -> None:
         del self._futile[lease.job.id]
+        self._log(lease).add(f"{result.status}: {result.message}")
         if self._record(stop, self._jobs.finish, lease, result.status, result.message):
             log.info("job %s: %s, %s", lease.job.id, result.status, result.message)
 

@@ -43,15 +43,7 @@ def job_lines(console: Console) -> Iterator[Callable[[JobProgress[Any]], None]]:
     callable
         Takes the progress of the job.
     """
-
-    def show(progress: JobProgress[Any]) -> None:
-        elapsed, left = progress.elapsed, progress.seconds_left
-        fraction = 0.0 if left is None else elapsed / (elapsed + left)
-        ProgressLine(
-            fraction=fraction, message=progress_text(progress), reached=progress.runs + progress.known
-        ).print_on(console)
-
-    yield show
+    yield lambda progress: _print_line(console, progress, progress_text(progress))
 
 
 @contextmanager
@@ -77,7 +69,7 @@ def job_progress(console: Console) -> Iterator[Callable[[JobProgress[Any]], None
 
 @contextmanager
 def study_lines(console: Console) -> Iterator[Callable[[Snapshot], None]]:
-    """Give a function that prints the progress of a study as a `ProgressLine`.
+    """Give a function that prints the progress of a study as a `ProgressLine`, and each change of a bracket.
 
     Parameters
     ----------
@@ -89,8 +81,14 @@ def study_lines(console: Console) -> Iterator[Callable[[Snapshot], None]]:
     callable
         Takes the latest snapshot of the study.
     """
-    with job_lines(console) as show:
-        yield lambda snapshot: show(snapshot.progress)
+    changed = _ChangedPoints()
+
+    def show(snapshot: Snapshot) -> None:
+        text = progress_text(snapshot.progress)
+        for line in changed.since_the_last(snapshot) or [text]:
+            _print_line(console, snapshot.progress, line)
+
+    yield show
 
 
 @contextmanager
@@ -113,7 +111,13 @@ def study_progress(console: Console) -> Iterator[Callable[[Snapshot], None]]:
                 Group(_table(snapshot), Text(progress_text(snapshot.progress)))
             )
     else:
-        yield _ChangedPoints(console).show
+        changed = _ChangedPoints()
+
+        def show(snapshot: Snapshot) -> None:
+            for line in changed.since_the_last(snapshot):
+                console.print(line, soft_wrap=True, highlight=False)
+
+        yield show
 
 
 @contextmanager
@@ -231,20 +235,26 @@ def _duration(seconds: float) -> str:
     return str(timedelta(seconds=round(seconds)))
 
 
-class _ChangedPoints:
-    """Prints one line for each change of a bracket or a status, with the progress of the whole study."""
+def _print_line(console: Console, progress: JobProgress[Any], message: str) -> None:
+    elapsed, left = progress.elapsed, progress.seconds_left
+    fraction = 0.0 if left is None else elapsed / (elapsed + left)
+    reached = progress.runs + progress.known
+    ProgressLine(fraction=fraction, message=message, reached=reached).print_on(console)
 
-    def __init__(self, console: Console) -> None:
-        self._console = console
+
+class _ChangedPoints:
+    """Says which brackets or statuses have changed, with the progress of the whole study."""
+
+    def __init__(self) -> None:
         self._shown: dict[float, str] = {}
 
-    def show(self, snapshot: Snapshot) -> None:
-        """Print what has changed since the last snapshot."""
+    def since_the_last(self, snapshot: Snapshot) -> list[str]:
+        """Return a line for each point that has changed since the last snapshot."""
+        lines = []
         for point in snapshot.boundary.points:
             ((name, at),) = point.parameters.items()
             line = f"{name} {at:g}: {bracket_text(point)} {point.status}"
             if point.runs and line != self._shown.get(at):
                 self._shown[at] = line
-                self._console.print(
-                    f"{line} ({progress_text(snapshot.progress)})", soft_wrap=True, highlight=False
-                )
+                lines.append(f"{line} ({progress_text(snapshot.progress)})")
+        return lines

@@ -4,7 +4,7 @@ import { eventsOf, get, getText } from "../api.js";
 import { followBoundary } from "../boundary.js";
 import { definitions, element } from "../dom.js";
 import { dateAndTime, duration, words } from "../format.js";
-import { cancelButton, isUnfinished, progressOf, resultLink } from "../job.js";
+import { againButtons, cancelButton, isUnfinished, progressOf, resultLink } from "../job.js";
 import { kindNamed } from "../kinds.js";
 import { Problem, alertAbout, messageOf } from "../problems.js";
 
@@ -57,8 +57,8 @@ function heading(job) {
       "div",
       { class: "heading" },
       element("h1", {}, words(job.name)),
-      cancelButton(job),
-      element("p", {}, kindNamed(job.kind).title),
+      element("div", { class: "actions" }, cancelButton(job), againButtons(job)),
+      element("p", {}, kindNamed(job.kind).title, ": ", element("code", {}, job.name)),
     ),
     element(
       "div",

@@ -1,20 +1,33 @@
-/** A form that submits a preset, or the scene of a run, with changed parameters. */
+/** A form that submits a preset, or what a run, a boundary or a job was made of, with changed parameters. */
 
 import { get, getAll, post } from "../api.js";
 import { element } from "../dom.js";
-import { fieldsOf } from "../fields.js";
-import { number, words } from "../format.js";
-import { FieldInput, FurtherChanges } from "../inputs.js";
+import { FormDocument } from "../fields.js";
+import { number, roughly, words } from "../format.js";
+import { FieldInput, FurtherChanges, UnionInput } from "../inputs.js";
 import { kindNamed, kinds, sceneIn } from "../kinds.js";
-import { alertAbout, messageOf } from "../problems.js";
+import { Problem, alertAbout, messageOf } from "../problems.js";
 import { goTo } from "../router.js";
+import { schemaOf } from "../schema.js";
 
 /**
  * @typedef {object} Template - What the form submits, apart from the changes.
  * @property {string} title
  * @property {any} document
  * @property {string} kind - Which kind of question it asks.
- * @property {{preset: string} | {scene: any}} origin
+ * @property {Record<string, any>} origin - The preset or the document, and what a job was allowed to use.
+ *
+ * @typedef {object} Estimate
+ * @property {number} runs
+ * @property {number} ranks
+ * @property {number | null} seconds
+ * @property {number} cost
+ * @property {number} maximum
+ * @property {number} recorded
+ * @property {number} most_recorded
+ * @property {number} memory
+ * @property {number} most_memory
+ * @property {boolean} accepted
  */
 
 const USUAL_PRESET = "critical-hamaker";
@@ -25,13 +38,15 @@ export async function showSubmission({ content, query, signal }) {
   document.title = "New job – Vesicle ensemble";
   const presets = await getAll("/presets", signal);
   const template = await templateOf(query, presets, signal);
+  const kind = kindNamed(template.kind);
+  const form = new FormDocument(template.document, kind, await schemaOf(template.kind));
   content.replaceChildren(
     element("div", { class: "heading" }, element("h1", {}, "New job")),
     element(
       "div",
       { class: "columns submission" },
-      new SubmissionForm(template, signal).element,
-      choices(presets, "preset" in template.origin ? template.origin.preset : null),
+      new SubmissionForm(template, form, signal).element,
+      choices(presets, template.origin.preset ?? null),
     ),
   );
   content.querySelector(".shelf [aria-current]")?.scrollIntoView({ block: "nearest", inline: "center" });
@@ -44,10 +59,20 @@ export async function showSubmission({ content, query, signal }) {
  * @returns {Promise<Template>}
  */
 async function templateOf(query, presets, signal) {
-  const run = query.get("run");
+  const [run, boundary, job] = ["run", "boundary", "job"].map((name) => query.get(name));
   if (run) {
     const { scene } = await get(`/runs/${run}`, signal);
     return { title: `Scene of run ${run.slice(0, 8)}`, document: scene, kind: "scene", origin: { scene } };
+  }
+  if (boundary) {
+    const { study, name } = await get(`/boundaries/${boundary}`, signal);
+    return { title: words(name), document: study, kind: "study", origin: { study } };
+  }
+  if (job) {
+    const [{ name, kind }, origin] = await Promise.all(
+      [`/jobs/${job}`, `/jobs/${job}/submission`].map((path) => get(path, signal)),
+    );
+    return { title: words(name), document: origin[kind], kind, origin };
   }
   const wanted = query.get("preset") ?? USUAL_PRESET;
   const preset = presets.find(({ name }) => name === wanted) ?? presets[0];
@@ -78,7 +103,12 @@ function choices(presets, current) {
               element(
                 "span",
                 {},
-                wanted.has_many_runs ? `up to ${estimate.runs} runs` : contents(sceneIn(document, wanted)),
+                [
+                  wanted.has_many_runs ? `up to ${estimate.runs} runs` : contents(sceneIn(document, wanted)),
+                  estimate.seconds === null ? "" : `about ${roughly(estimate.seconds)}`,
+                ]
+                  .filter(Boolean)
+                  .join(", "),
               ),
             ),
           ),
@@ -95,9 +125,12 @@ function contents({ vesicles, arrangement, flow }) {
   return `${count === 1 ? "1 vesicle" : `${count} vesicles`}, ${flow ? flow.kind : "at rest"}`;
 }
 
-/** @param {string} id - Also the name of the limit in the document that is sent. */
-function limitInput(id) {
-  return element("input", { id, type: "number", min: 1, placeholder: "default of the service" });
+/**
+ * @param {string} id - Also the name of the limit in the document that is sent.
+ * @param {number | undefined} value
+ */
+function limitInput(id, value) {
+  return element("input", { id, type: "number", min: 1, value, placeholder: "default of the service" });
 }
 
 /**
@@ -116,15 +149,17 @@ class SubmissionForm {
 
   /**
    * @param {Template} template
+   * @param {FormDocument} form
    * @param {AbortSignal} signal
    */
-  constructor(template, signal) {
+  constructor(template, form, signal) {
     this.template = template;
     this.signal = signal;
-    this.inputs = fieldsOf(template.document, kindNamed(template.kind)).map((field) => new FieldInput(field));
+    this.inputs = form.fields.map((field) => new FieldInput(field));
+    this.unions = form.unions.map((union) => new UnionInput(union, form));
     this.further = new FurtherChanges();
-    this.ranks = limitInput("ranks");
-    this.seconds = limitInput("seconds");
+    this.ranks = limitInput("ranks", template.origin.ranks);
+    this.seconds = limitInput("seconds", template.origin.seconds);
     this.cost = element("p", { class: "cost", role: "status" });
     this.submit = element("button", { class: "primary" }, "Submit");
     this.element = element(
@@ -155,7 +190,7 @@ class SubmissionForm {
       this.inputs.filter((input) => input.field.isPrincipal === wanted).map((input) => input.element),
     );
     return [
-      element("div", { class: "fields" }, ...principal),
+      element("div", { class: "fields" }, ...principal, ...this.unions.map((union) => union.element)),
       element(
         "details",
         {},
@@ -168,12 +203,8 @@ class SubmissionForm {
 
   /** The document to send. */
   get submission() {
-    const changed = this.inputs
-      .filter((input) => input.isChanged)
-      .map((input) => [input.field.path, input.value]);
-    const limits = [this.ranks, this.seconds]
-      .filter((input) => input.value)
-      .map((input) => [input.id, Number(input.value)]);
+    const changed = [...this.inputs, ...this.unions].flatMap((input) => input.changes);
+    const limits = [this.ranks, this.seconds].map((input) => [input.id, input.value ? Number(input.value) : null]);
     const changes = Object.fromEntries([...changed, ...this.further.changes]);
     return { ...this.template.origin, ...Object.fromEntries(limits), set: changes };
   }
@@ -198,46 +229,38 @@ class SubmissionForm {
     }
   }
 
-  /**
-   * @param {{runs: number, cost: number, maximum: number, recorded: number, most_recorded: number,
-   *   memory: number, most_memory: number, accepted: boolean}} estimate
-   */
-  #showCost({ runs, cost, maximum, recorded, most_recorded, memory, most_memory, accepted }) {
-    const count = runs === 1 ? "One run" : `At most ${runs} runs`;
-    const share = `cost ${number(cost, 2)} of ${number(maximum, 2)} allowed (points × vesicles × time)`;
-    if (recorded > most_recorded) {
-      const records = `records ${number(recorded, 2)} numbers of ${number(most_recorded, 2)} allowed`;
-      this.cost.textContent = `Too large: ${records}. Raise the intervals of the output.`;
-      return;
-    }
-    if (memory > most_memory) {
-      const bytes = `needs ${number(memory / 1e9, 2)} GB of ${number(most_memory / 1e9, 2)} GB allowed`;
-      this.cost.textContent = `Too large: ${bytes}. Choose fewer points or vesicles.`;
-      return;
-    }
-    this.cost.textContent = accepted ? `${count}, ${share}.` : `Too large: ${share}.`;
-    this.submit.disabled = !accepted;
-    this.#mark("");
+  /** @param {Estimate} estimate */
+  #showCost(estimate) {
+    const excess = excessOf(estimate);
+    this.cost.textContent = excess ?? `${runsAndTime(estimate)}.`;
+    this.submit.disabled = excess !== null;
+    this.#mark([]);
   }
 
   /** @param {unknown} error */
   #refuse(error) {
-    this.cost.replaceChildren(alertAbout(error));
+    const problems = error instanceof Problem ? messageOf(error).split("; ") : [];
+    const unplaced = this.#mark(problems);
+    const places = problems.length - unplaced.length;
+    const shown = problems.length > 0 && places > 0 ? [`See the marked ${places === 1 ? "field" : "fields"}`, ...unplaced] : null;
+    this.cost.replaceChildren(alertAbout(shown ? new Error(`${shown.join("; ")}.`) : error));
     this.submit.disabled = true;
-    this.#mark(messageOf(error));
   }
 
   /**
-   * Mark the inputs whose paths a message names. The input of all vesicles stands for the field of one of them.
+   * Show problems beside the inputs that they name. That of all vesicles stands for the field of one of them.
    *
-   * @param {string} message
+   * @param {string[]} problems - `path: value — reason`.
+   * @returns {string[]} Those that name none of the inputs.
    */
-  #mark(message) {
-    const general = message.replaceAll(/\.\d+(?=\.)/g, "");
-    for (const input of this.inputs) {
-      const { path } = input.field;
-      input.mark([message, general].some((text) => text.split(/[\s:;]+/).includes(path)));
+  #mark(problems) {
+    const unplaced = new Set(problems);
+    for (const input of [...this.inputs, ...this.unions].flatMap((each) => each.inputs)) {
+      const named = problems.filter((problem) => isAbout(problem, input.field.path));
+      named.forEach((problem) => unplaced.delete(problem));
+      input.mark(named.map((problem) => reasonIn(problem, input.field.path)).join("; "));
     }
+    return [...unplaced];
   }
 
   /** @param {Event} event */
@@ -253,4 +276,59 @@ class SubmissionForm {
       this.submit.disabled = false;
     }
   }
+}
+
+/**
+ * Say how many runs a job makes, and how long that takes.
+ *
+ * @param {Estimate} estimate
+ */
+function runsAndTime({ runs, ranks, seconds }) {
+  const count = runs === 1 ? "One run" : `At most ${runs} runs`;
+  const on = ranks === 1 ? "one process" : `${ranks} processes`;
+  return seconds === null
+    ? `${count} on ${on}; how long ${runs === 1 ? "it takes" : "they take"} is known after the first runs like ` +
+        `${runs === 1 ? "it" : "them"}`
+    : `${count}, about ${roughly(seconds)} on ${on}`;
+}
+
+/**
+ * Say which limit of the service a job exceeds.
+ *
+ * @param {Estimate} estimate
+ * @returns {string | null} Null if it exceeds none.
+ */
+function excessOf({ cost, maximum, recorded, most_recorded, memory, most_memory, accepted }) {
+  if (recorded > most_recorded) {
+    const records = `records ${number(recorded, 2)} numbers of ${number(most_recorded, 2)} allowed`;
+    return `Too large: ${records}. Raise the intervals of the output.`;
+  }
+  if (memory > most_memory) {
+    const bytes = `needs ${number(memory / 1e9, 2)} GB of ${number(most_memory / 1e9, 2)} GB allowed`;
+    return `Too large: ${bytes}. Choose fewer points or vesicles.`;
+  }
+  const share = `${number(cost / maximum, 2)} times what is allowed (points × vesicles × time)`;
+  return accepted ? null : `Too large: ${share}. Choose fewer values, fewer points or an earlier end.`;
+}
+
+/**
+ * Whether a problem is about the field at a path, or about one in its place in a single vesicle.
+ *
+ * @param {string} problem
+ * @param {string} path
+ */
+function isAbout(problem, path) {
+  const general = problem.replaceAll(/\.\d+(?=\.)/g, "");
+  return [problem, general].some((text) => text.split(/[\s:;]+/).includes(path));
+}
+
+/**
+ * The reason in a problem without the path and the value, which the form shows beside it.
+ *
+ * @param {string} problem
+ * @param {string} path
+ */
+function reasonIn(problem, path) {
+  const reason = problem.startsWith(path) ? problem.slice(problem.indexOf(": ") + 2).split(" — ").pop() : problem;
+  return /** @type {string} */ (reason).replaceAll("input should be", "must be");
 }

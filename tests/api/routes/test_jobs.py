@@ -112,6 +112,18 @@ def test_bad_submissions_are_refused_and_named(submitting, submission, named):
     assert submitting.get("/jobs").json() == {"items": [], "next": None}
 
 
+@pytest.mark.parametrize("preset", ["critical-hamaker", "doublet-shear"])
+def test_a_job_can_be_submitted_again_as_it_was(submitting, preset):
+    job = submit(
+        submitting, preset=preset, set={"criteria.revolutions": 3} if preset == "doublet-shear" else {}
+    )
+    again = submit(submitting, **submitting.get(f"/jobs/{job['id']}/submission").json())
+    assert again["id"] != job["id"]
+    for same in ("kind", "key", "ranks", "seconds"):
+        assert again[same] == job[same]
+    assert submitting.get(f"/jobs/{32 * '0'}/submission").status_code == 404
+
+
 def test_other_content_than_json_is_refused(submitting):
     response = submitting.post(
         "/jobs", content=b"preset=doublet-shear", headers={"Content-Type": "text/plain"}

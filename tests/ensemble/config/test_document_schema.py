@@ -76,3 +76,10 @@ def test_descriptions_come_from_the_docstrings() -> None:
     assert schema["$defs"]["Search"]["properties"]["tolerance"]["description"].startswith("Relative width")
     # That of a field which several flows inherit.
     assert "gradient" in schema["$defs"]["Shear"]["properties"]["rate"]["description"]
+
+
+def test_a_number_with_a_unit_names_it() -> None:
+    tables = document_schema(Study)["$defs"]
+    assert tables["Scene"]["properties"]["horizon"]["x-unit"] == "mu R^3 kappa^-1"
+    assert tables["Vesicle"]["properties"]["center"]["prefixItems"][0]["x-unit"] == "R"
+    assert "x-unit" not in tables["Vesicle"]["properties"]["reduced_area"]
