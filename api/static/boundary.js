@@ -2,8 +2,9 @@
 
 import { changesOf, get } from "./api.js";
 import { otherChanges, phaseDiagram } from "./diagram.js";
+import { DiagramKeys } from "./diagram_keys.js";
 import { definitions, element, table } from "./dom.js";
-import { interval, number, words } from "./format.js";
+import { ends, interval, number } from "./format.js";
 import { outcomeLabel } from "./outcomes.js";
 import { Plot } from "./plot.js";
 import { alertAbout } from "./problems.js";
@@ -26,14 +27,15 @@ const CONVERGED = "converged";
  * @param {HTMLElement} place
  * @param {string} key
  * @param {AbortSignal} signal
+ * @param {Boundary | null} [compared] - Another boundary that is drawn with it.
  * @returns {Promise<void>} Resolved when another view is shown.
  */
-export async function followBoundary(place, key, signal) {
+export async function followBoundary(place, key, signal, compared = null) {
   const marks = new Marks(signal);
   let view = null;
   for await (const boundary of changesOf(`/boundaries/${key}`, SECONDS_BETWEEN_REQUESTS, signal)) {
     const runs = await marks.of(boundary);
-    view ??= new BoundaryView(place, signal);
+    view ??= new BoundaryView(place, signal, compared);
     view.show(boundary, runs);
   }
 }
@@ -53,15 +55,15 @@ class Marks {
    * @returns {Promise<Mark[]>}
    */
   async of(boundary) {
-    const { sweep, search } = boundary.study;
+    const { scene, sweep, search } = boundary.study;
+    const paths = [sweep.parameter, search.parameter];
+    const symbols = paths.map((path) => quantity(path, scene).symbol);
     const keys = boundary.points.flatMap((point) => point.runs);
     const summaries = await Promise.all(keys.map((key) => this.#summary(key)));
-    return summaries.map(({ key, scene, outcome }) => ({
-      key,
-      outcome,
-      x: valueAt(scene, sweep.parameter),
-      y: valueAt(scene, search.parameter),
-    }));
+    return summaries.map((run) => {
+      const [x, y] = paths.map((path) => valueAt(run.scene, path));
+      return { key: run.key, outcome: run.outcome, x, y, text: textOf(run, [x, y], symbols) };
+    });
   }
 
   /** @param {string} key */
@@ -72,19 +74,46 @@ class Marks {
   }
 }
 
+/**
+ * Say in a few lines what became of a run, and how far to trust it.
+ *
+ * @param {any} run
+ * @param {number[]} values
+ * @param {string[]} symbols
+ */
+function textOf({ outcome, failure, period, gap, error, work }, values, symbols) {
+  const known = (/** @type {string} */ name, /** @type {any} */ value, /** @type {any} */ uncertainty) =>
+    typeof value === "number"
+      ? [`${name} ${number(value)}${typeof uncertainty === "number" ? ` ± ${number(uncertainty, 1)}` : ""}`]
+      : [];
+  return [
+    `${outcome}${failure ? `: ${failure.replaceAll("<", "‹")}` : ""}`,
+    symbols.map((symbol, index) => `${symbol} = ${number(values[index])}`).join(", "),
+    ...known("period", period, error.period),
+    ...known("gap", gap, null),
+    ...known("position error", error.global, null),
+    `area error ${number(error.area, 2)}, spatial error ${number(error.spatial, 2)}`,
+    `${work.points} points on each vesicle`,
+  ];
+}
+
 class BoundaryView {
   /**
    * @param {HTMLElement} place
    * @param {AbortSignal} signal
+   * @param {Boundary | null} compared
    */
-  constructor(place, signal) {
+  constructor(place, signal, compared) {
     this.signal = signal;
+    this.compared = compared;
     this.heading = element("div", { class: "heading" });
-    this.figure = element("div", { class: "plot diagram", role: "img" });
+    this.figure = element("div", { class: "plot diagram", role: "application", tabindex: 0 });
+    const status = element("p", { class: "note", role: "status" });
     this.points = element("section", { "aria-label": "Points of the boundary" });
     this.runs = element("details", { class: "runs" });
     this.reading = element("section", {});
     this.plot = new Plot(this.figure, signal);
+    this.keys = new DiagramKeys(this.plot, status);
     this.plot.on(
       "plotly_click",
       ({ points: [point] }) => point.customdata && goTo(`/runs/${point.customdata}`),
@@ -94,7 +123,7 @@ class BoundaryView {
       element(
         "div",
         { class: "columns" },
-        element("div", {}, this.figure, this.runs),
+        element("div", {}, this.figure, status, this.runs),
         element("div", {}, this.points, this.reading),
       ),
     );
@@ -119,8 +148,9 @@ class BoundaryView {
       ),
     );
     this.figure.setAttribute("aria-label", summary(boundary, marks));
-    void this.plot.draw(() => phaseDiagram(boundary, marks));
-    this.points.replaceChildren(pointsTable(boundary));
+    void this.plot.draw(() => phaseDiagram(boundary, marks, this.compared));
+    this.keys.follow(marks);
+    this.points.replaceChildren(pointsTable(boundary, marks));
     this.#showRuns(boundary, marks);
     this.#addReadingForm(boundary);
   }
@@ -169,12 +199,18 @@ function summary(boundary, marks) {
   return `Phase diagram. ${titleOf(boundary)}: ${marks.length} runs, ${boundary.points.length} points of the boundary`;
 }
 
-/** @param {Boundary} boundary */
-function pointsTable(boundary) {
+/**
+ * @param {Boundary} boundary
+ * @param {Mark[]} marks
+ */
+function pointsTable(boundary, marks) {
   const { scene, sweep, search } = boundary.study;
   const rows = boundary.points.map((point) => [
     number(point.parameters[sweep.parameter]),
-    [point, ...otherChanges(point)].map(({ bracket }) => interval(bracket)).join("; also "),
+    [point, ...otherChanges(point)].flatMap(({ bracket }, index) => [
+      index > 0 ? "; also " : "",
+      bracketLinks(bracket, point.parameters[sweep.parameter], marks),
+    ]),
     element("span", { class: `state ${stateOf(point)}` }, point.certified ? "certified" : point.status),
     scannedText(point),
   ]);
@@ -191,6 +227,26 @@ function pointsTable(boundary) {
 }
 
 /**
+ * Write a bracket whose ends lead to their runs.
+ *
+ * @param {[number | null, number | null]} bracket
+ * @param {number} at - Value of the swept parameter.
+ * @param {Mark[]} marks
+ * @returns {import("./dom.js").Child}
+ */
+function bracketLinks(bracket, at, marks) {
+  const [low, high] = bracket;
+  if (low === null || high === null) {
+    return interval(bracket);
+  }
+  const links = ends([low, high]).map((text, index) => {
+    const mark = marks.find(({ x, y }) => x === at && y === bracket[index]);
+    return mark ? element("a", { href: `#/runs/${mark.key}`, title: mark.outcome }, text) : text;
+  });
+  return [links[0], " – ", links[1]];
+}
+
+/**
  * Say how many values were looked at beside the brackets, and how wide an unseen window may be.
  *
  * @param {Point} point
@@ -202,11 +258,11 @@ function scannedText({ scanned }) {
 }
 
 /** @param {Point} point */
-function stateOf({ status }) {
+function stateOf({ status, certified }) {
   if (OPEN.includes(status)) {
     return "live";
   }
-  return status === CONVERGED ? "done" : "bad";
+  return status === CONVERGED ? `done ${certified ? "certified" : ""}` : "bad";
 }
 
 /** @param {Point[]} points */

@@ -1,5 +1,6 @@
 /**
- * The phase diagram of a study: all runs, the brackets of the boundary and a straight line through them.
+ * The phase diagram of a study: all runs, the brackets of the boundary and a straight line through them. Perhaps with
+ * another boundary, of the same parameters.
  *
  * A pure function from documents of the service to a figure, which `Plot` draws.
  */
@@ -38,6 +39,7 @@ import { color } from "./theme.js";
  * @property {number} x
  * @property {number} y
  * @property {string} outcome
+ * @property {string[]} text - What is said of it: outcome, place, results and errors.
  */
 
 const LAST_IN_LEGEND = 2000; // the default of Plotly is 1000
@@ -45,26 +47,26 @@ const LAST_IN_LEGEND = 2000; // the default of Plotly is 1000
 /**
  * @param {Boundary} boundary
  * @param {Mark[]} marks
+ * @param {Boundary | null} compared
  * @returns {Figure}
  */
-export function phaseDiagram(boundary, marks) {
+export function phaseDiagram(boundary, marks, compared) {
   const { scene, sweep, search } = boundary.study;
   const x = quantity(sweep.parameter, scene);
   const y = quantity(search.parameter, scene);
-  const points = boundary.points
-    .filter((point) => point.bracket.every((end) => end !== null))
-    .sort((first, second) => at(first, boundary) - at(second, boundary));
+  const points = bracketed(boundary);
   return {
     data: [
       ...fitLine(boundary, points, x.symbol, y.symbol),
-      ...runs(marks, x.symbol, y.symbol),
+      ...(compared ? comparedBoundary(compared) : []),
+      ...runs(marks),
       ...brackets(boundary, points),
       ...otherBrackets(boundary),
     ],
     layout: {
       height: 480,
       margin: { l: 64, r: 16, t: 12, b: 56 },
-      xaxis: axis({ title: { text: title(x), standoff: 12 }, range: range(boundary, marks) }),
+      xaxis: axis({ title: { text: title(x), standoff: 12 }, range: range(boundary, marks, compared) }),
       yaxis: axis({ title: { text: title(y), standoff: 12 }, rangemode: "normal" }),
       legend: {
         orientation: "h",
@@ -76,6 +78,17 @@ export function phaseDiagram(boundary, marks) {
       hovermode: "closest",
     },
   };
+}
+
+/**
+ * The points of a boundary that have a bracket, along the sweep.
+ *
+ * @param {Boundary} boundary
+ */
+function bracketed(boundary) {
+  return boundary.points
+    .filter((point) => point.bracket.every((end) => end !== null))
+    .sort((first, second) => at(first, boundary) - at(second, boundary));
 }
 
 /** @param {{name: string, symbol: string}} quantity */
@@ -96,20 +109,18 @@ function at(point, boundary) {
  *
  * @param {Boundary} boundary
  * @param {Mark[]} marks
+ * @param {Boundary | null} compared
  */
-function range(boundary, marks) {
-  const all = [...boundary.study.sweep.values, ...marks.map((mark) => mark.x)];
+function range(boundary, marks, compared) {
+  const swept = [boundary, compared].flatMap((each) => each?.study.sweep.values ?? []);
+  const all = [...swept, ...marks.map((mark) => mark.x)];
   const [low, high] = [Math.min(...all), Math.max(...all)];
   const margin = 0.07 * (high - low) || 0.1 * Math.abs(high) || 1;
   return [low - margin, high + margin];
 }
 
-/**
- * @param {Mark[]} marks
- * @param {string} x
- * @param {string} y
- */
-function runs(marks, x, y) {
+/** @param {Mark[]} marks */
+function runs(marks) {
   return Object.entries(MARKS).flatMap(([outcome, { color: name, symbol }]) => {
     const chosen = marks.filter((mark) => mark.outcome === outcome);
     if (chosen.length === 0) {
@@ -129,39 +140,79 @@ function runs(marks, x, y) {
         color: color(name),
         line: { width: isOpen ? 1.6 : 0.8, color: color(isOpen ? name : "page") },
       },
-      hovertemplate: `${outcome}<br>${x} = %{x:.4g}, ${y} = %{y:.4g}<extra></extra>`,
+      text: chosen.map((mark) => mark.text.join("<br>")),
+      hovertemplate: "%{text}<extra></extra>",
     };
   });
 }
+
+/** Brackets that are certified have thick bars. */
+const BARS = { certified: { thickness: 3.2, width: 9 }, usual: { thickness: 1.2, width: 8 } };
 
 /**
  * @param {Boundary} boundary
  * @param {Point[]} points
  */
 function brackets(boundary, points) {
-  if (points.length === 0) {
-    return [];
-  }
+  return [true, false].flatMap((certified) => {
+    const chosen = points.filter((point) => point.certified === certified);
+    return chosen.length > 0 ? bracketsWithLegend(boundary, chosen, certified) : [];
+  });
+}
+
+/**
+ * @param {Boundary} boundary
+ * @param {Point[]} points
+ * @param {boolean} certified
+ */
+function bracketsWithLegend(boundary, points, certified) {
+  const bar = certified ? BARS.certified : BARS.usual;
   const ends = points.map((point) => /** @type {[number, number]} */ (point.bracket));
-  const certified = points.filter((point) => point.certified).length;
-  const bars = barsOf(points.map((point) => at(point, boundary)), ends, "ink");
   const inLegend = {
     type: "scatter",
     mode: "markers",
-    name: certified ? `bracket (${certified} of ${points.length} certified)` : "bracket",
+    name: certified ? "certified bracket" : "bracket",
     x: [null],
     y: [null],
-    marker: { symbol: "line-ns-open", size: 12, line: { width: 1.2 }, color: color("ink") },
+    marker: { symbol: "line-ns-open", size: 12, line: { width: bar.thickness }, color: color("ink") },
   };
-  return [bars, inLegend];
+  return [
+    barsOf(
+      points.map((point) => at(point, boundary)),
+      ends,
+      "ink",
+      bar,
+    ),
+    inLegend,
+  ];
+}
+
+/**
+ * Another boundary: its brackets, with a line through their middles.
+ *
+ * @param {Boundary} boundary
+ */
+function comparedBoundary(boundary) {
+  const points = bracketed(boundary);
+  const ends = points.map((point) => /** @type {[number, number]} */ (point.bracket));
+  const bars = barsOf(
+    points.map((point) => at(point, boundary)),
+    ends,
+    "compared",
+    BARS.usual,
+  );
+  const name = boundary.name.replaceAll("&", "&amp;").replaceAll("<", "&lt;");
+  const legendrank = LAST_IN_LEGEND + 1;
+  return [{ ...bars, name, legendrank, showlegend: true, line: { color: color("compared"), width: 1.8, dash: "2px,3px" } }];
 }
 
 /**
  * @param {number[]} x
  * @param {[number, number][]} ends
  * @param {string} name - Of a color.
+ * @param {{thickness: number, width: number}} bar
  */
-function barsOf(x, ends, name) {
+function barsOf(x, ends, name, bar = BARS.usual) {
   return {
     type: "scatter",
     mode: "lines",
@@ -172,8 +223,7 @@ function barsOf(x, ends, name) {
       type: "data",
       array: ends.map(([low, high]) => (high - low) / 2),
       color: color(name),
-      thickness: 1.2,
-      width: 8,
+      ...bar,
     },
     hoverinfo: "skip",
     showlegend: false,

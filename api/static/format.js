@@ -50,8 +50,18 @@ export function interval([low, high]) {
   if (low === null || high === null) {
     return low === null ? `below ${number(high)}` : `above ${number(low)}`;
   }
+  return ends([low, high]).join(" – ");
+}
+
+/**
+ * Write the ends of a bracket, each with enough digits to distinguish them.
+ *
+ * @param {[number, number]} bracket
+ * @returns {string[]}
+ */
+export function ends([low, high]) {
   const decimals = Math.min(Math.max(1 - Math.floor(Math.log10(high - low || high)), 0), 10);
-  return `${low.toFixed(decimals)} – ${high.toFixed(decimals)}`;
+  return [low, high].map((end) => end.toFixed(decimals));
 }
 
 /**

@@ -62,6 +62,27 @@ export class Plot {
     });
   }
 
+  /**
+   * Show the label of a point as if the mouse were above it.
+   *
+   * @param {string} key - The point's custom data.
+   */
+  async hover(key) {
+    const plotly = await loadPlotly();
+    const traces = /** @type {any} */ (this.place).data;
+    const curveNumber = traces.findIndex((/** @type {any} */ { customdata }) => customdata?.includes(key));
+    if (curveNumber >= 0 && !this.signal.aborted) {
+      plotly.Fx.hover(this.place, [{ curveNumber, pointNumber: traces[curveNumber].customdata.indexOf(key) }]);
+    }
+  }
+
+  async unhover() {
+    const plotly = await loadPlotly();
+    if (!this.signal.aborted) {
+      plotly.Fx.hover(this.place, []);
+    }
+  }
+
   async #redraw() {
     const plotly = await loadPlotly();
     if (this.#figure !== null && !this.signal.aborted) {
@@ -78,11 +99,17 @@ export class Plot {
 }
 
 function pageLayout() {
+  const { fontFamily: family } = window.getComputedStyle(document.body);
   return {
     paper_bgcolor: "rgba(0,0,0,0)",
     plot_bgcolor: "rgba(0,0,0,0)",
-    font: { family: window.getComputedStyle(document.body).fontFamily, size: 13, color: color("ink") },
-    hoverlabel: { bgcolor: color("surface"), bordercolor: color("faint"), font: { color: color("ink") } },
+    font: { family, size: 13, color: color("ink") },
+    hoverlabel: {
+      bgcolor: color("surface"),
+      bordercolor: color("faint"),
+      font: { family, color: color("ink") },
+      align: "left",
+    },
     modebar: { bgcolor: "rgba(0,0,0,0)", color: color("faint"), activecolor: color("muted") },
     uirevision: "kept", // redrawing keeps the zoom
     dragmode: false, // so that dragging on a touch screen scrolls the page

@@ -32,8 +32,8 @@ def phase_diagram(boundary: Boundary, runs: Sequence[tuple[float, float, Outcome
     Returns
     -------
     Figure
-        The group ids of its artists are ``run <outcome>``, ``bracket``, ``other change``, ``boundary`` and
-        ``fit``.
+        The group ids of its artists are ``run <outcome>``, ``bracket``, ``certified bracket``,
+        ``other change``, ``boundary`` and ``fit``.
     """
     swept = boundary.study["sweep"]["parameter"]
     searched = boundary.study["search"]["parameter"]
@@ -87,16 +87,18 @@ def _draw_other_changes(axes: Axes, points: Sequence[BoundaryPoint], swept: str)
         _bars(axes, sweep, low, high, VERMILLION, "another change of the outcome").set_gid("other change")
 
 
-def _bars(axes: Axes, sweep: Array, low: Array, high: Array, color: str, label: str) -> LineCollection:
+def _bars(
+    axes: Axes, sweep: Array, low: Array, high: Array, color: str, label: str, thickness: float = 1.0
+) -> LineCollection:
     _, _, (bars,) = axes.errorbar(
         sweep,
         (low + high) / 2,
         yerr=(high - low) / 2,
         fmt="none",
         ecolor=color,
-        elinewidth=1.0,
+        elinewidth=thickness,
         capsize=5.5,
-        capthick=1.0,
+        capthick=thickness,
         zorder=3,
         label=label,
     )
@@ -104,12 +106,12 @@ def _bars(axes: Axes, sweep: Array, low: Array, high: Array, color: str, label: 
 
 
 def _draw_brackets(axes: Axes, bracketed: Sequence[BoundaryPoint], swept: str) -> None:
-    ends = np.array([point.bracket for point in bracketed], dtype=float)
-    certified = sum(point.certified for point in bracketed)
-    sweep = np.array([point.parameters[swept] for point in bracketed])
-    label = f"bracket ({certified} of {len(bracketed)} certified)"
-    low, high = ends.T
-    _bars(axes, sweep, low, high, BLACK, label).set_gid("bracket")
+    for label, thickness, is_certified in (("bracket", 1.0, False), ("certified bracket", 2.6, True)):
+        points = [point for point in bracketed if point.certified == is_certified]
+        if points:
+            low, high = np.array([point.bracket for point in points], dtype=float).T
+            sweep = np.array([point.parameters[swept] for point in points])
+            _bars(axes, sweep, low, high, BLACK, label, thickness).set_gid(label)
 
 
 def _draw_boundary(axes: Axes, bracketed: Sequence[BoundaryPoint], swept: str, y: Quantity) -> None:

@@ -20,7 +20,7 @@ from ensemble.config.documents import load_scene, load_study, preset_document, p
 from ensemble.config.run_key import run_key
 from ensemble.report import PAGE, ReportName, report_directory
 from ensemble.report.report_page import report_page
-from ensemble.search.boundary import Boundary
+from ensemble.search.boundary import Boundary, BoundaryPoint
 from ensemble.store import Store
 from solver.analysis.run import Outcome, Run
 from solver.flows import FLOWS
@@ -120,6 +120,7 @@ def count(page: Page, outcome: str) -> int:
 
 def widths(page: Page) -> list[float]:
     """Return the widths of the drawn brackets."""
+    page.locator(".diagram .main-svg").first.wait_for()
     traces = page.locator(".diagram").evaluate("plot => plot.data")
     return [2 * half for trace in traces for half in trace.get("error_y", {}).get("array", [])]
 
@@ -192,6 +193,72 @@ def test_a_mark_in_the_diagram_leads_to_its_run(page: Page, url: str, boundary: 
     page.mouse.up()
     page.wait_for_url("**/#/runs/*")
     expect(page.get_by_role("heading", level=1)).to_contain_text(Outcome.BOUND)
+
+
+def test_the_runs_of_a_diagram_are_reached_by_keys(page: Page, url: str, boundary: str, store: Path) -> None:
+    page.goto(url + boundary)
+    page.locator(".diagram .main-svg").first.wait_for()
+    page.get_by_role("application").focus()
+    page.keyboard.press("Home")
+    label = page.locator(".diagram .hoverlayer .hovertext")
+    expect(label).to_contain_text("separated")
+    page.keyboard.press("ArrowUp")
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("End")
+    status = page.get_by_role("status").filter(has_text="bound, γ̇ =")
+    expect(status).to_contain_text(re.compile("period .*, gap .*, area error .*, spatial error"))
+    page.keyboard.press("Enter")
+    page.wait_for_url("**/#/runs/*")
+    with Store.existing(store) as opened:
+        highest = opened.boundary(boundary.split("/")[-1]).points[-1]
+        runs = [opened.summary(key) for key in highest.runs]
+    last = max(runs, key=lambda run: run.scene.adhesion.hamaker)
+    assert page.url.endswith(last.key)
+
+
+def test_the_ends_of_a_bracket_lead_to_their_runs(page: Page, url: str, boundary: str) -> None:
+    page.goto(url + boundary)
+    page.get_by_role("table", name="Points of the boundary").get_by_role("link").first.click()
+    expect(page.get_by_role("heading", level=1)).to_contain_text(Outcome.SEPARATED)
+
+
+def test_two_boundaries_on_one_diagram(page: Page, url: str, boundary: str, store: Path) -> None:
+    study = load_study("critical-hamaker", ["search.tolerance=0.03"])
+    outcomes, status, bracket = (Outcome.SEPARATED, Outcome.BOUND), "converged", (0.4, 0.41)
+    points = [
+        BoundaryPoint(
+            parameters={"flow.rate": rate},
+            bracket=bracket,
+            outcomes=outcomes,
+            status=status,
+            certified=certified,
+            runs=[],
+        )
+        for rate, certified in ((0.5, True), (1.0, False))
+    ]
+    with Store.open(store) as opened:
+        opened.save_boundary(
+            Boundary(
+                study_key=study.key,
+                study=study.model_dump(mode="json"),
+                name=study.name,
+                points=points,
+                updated=EARLIER,
+            )
+        )
+    page.goto(url + boundary)
+    drawn = widths(page)
+    page.get_by_label("Draw with").select_option(study.name)
+    page.wait_for_url(f"**?with={study.key}")
+    page.locator(".diagram .main-svg").first.wait_for()
+    assert sorted(widths(page)) == pytest.approx(sorted([*drawn, 0.01, 0.01]))
+    expect(page.locator(".diagram .legend")).to_contain_text(study.name)
+    # Of its own, with the certified bracket drawn thicker.
+    page.goto(f"{url}/#/boundaries/{study.key}")
+    expect(page.locator(".diagram .legend")).to_contain_text("certified bracket")
+    traces = page.locator(".diagram").evaluate("plot => plot.data")
+    bars = {trace["x"][0]: trace["error_y"]["thickness"] for trace in traces if "error_y" in trace}
+    assert bars[0.5] > 2 * bars[1.0]
 
 
 def test_the_name_of_a_study_is_not_interpreted_as_html(page: Page, url: str, store: Path) -> None:

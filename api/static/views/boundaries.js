@@ -1,9 +1,10 @@
 /** The boundaries of the store, and one of them in detail: the selected one or the one that changed last. */
 
-import { getAll } from "../api.js";
+import { get, getAll } from "../api.js";
 import { followBoundary } from "../boundary.js";
 import { element } from "../dom.js";
 import { dateAndTime, words } from "../format.js";
+import { goTo } from "../router.js";
 
 /** @typedef {import("../diagram.js").Boundary} Boundary */
 
@@ -17,7 +18,7 @@ const BEGINNINGS = [
 ];
 
 /** @param {import("../router.js").Place} place */
-export async function showBoundaries({ content, parameters, signal }) {
+export async function showBoundaries({ content, parameters, query, signal }) {
   /** @type {Boundary[]} */
   const boundaries = await getAll("/boundaries", signal);
   boundaries.sort((first, second) => second.updated.localeCompare(first.updated));
@@ -26,13 +27,15 @@ export async function showBoundaries({ content, parameters, signal }) {
     content.replaceChildren(...invitation());
     return;
   }
-  document.title = `${words(boundaries.find(({ study_key }) => study_key === key)?.name ?? key)} – Vesicle ensemble`;
+  const shownBoundary = boundaries.find(({ study_key }) => study_key === key) ?? (await get(`/boundaries/${key}`, signal));
+  const compared = boundaries.find(({ study_key }) => study_key === query.get("with")) ?? null;
+  document.title = `${words(shownBoundary.name)} – Vesicle ensemble`;
   const shown = element("div", {});
-  content.replaceChildren(shown);
+  content.replaceChildren(shown, ...comparison(boundaries, shownBoundary, compared));
   if (boundaries.length > 1) {
     content.append(others(boundaries, key));
   }
-  await followBoundary(shown, key, signal);
+  await followBoundary(shown, key, signal, compared);
 }
 
 function invitation() {
@@ -53,6 +56,36 @@ function invitation() {
     ),
     element("nav", { class: "shelf", "aria-label": "Examples to begin with" }, element("ul", {}, ...ways)),
   ];
+}
+
+/**
+ * A menu of the boundaries in the same two parameters, one of which can be drawn with the present one.
+ *
+ * @param {Boundary[]} boundaries
+ * @param {Boundary} current
+ * @param {Boundary | null} compared
+ */
+function comparison(boundaries, current, compared) {
+  const parameters = (/** @type {Boundary} */ { study: { sweep, search } }) => `${sweep.parameter} ${search.parameter}`;
+  const alike = boundaries.filter(
+    (each) => each.study_key !== current.study_key && parameters(each) === parameters(current),
+  );
+  if (alike.length === 0) {
+    return [];
+  }
+  const menu = element(
+    "select",
+    {
+      id: "compared",
+      onchange: () => goTo(`/boundaries/${current.study_key}${menu.value ? `?with=${menu.value}` : ""}`),
+    },
+    element("option", { value: "" }, "no other boundary"),
+    ...alike.map(({ study_key, name }) =>
+      element("option", { value: study_key, selected: study_key === compared?.study_key }, name),
+    ),
+  );
+  const label = element("label", { for: "compared" }, "Draw with");
+  return [element("form", { class: "inline comparison" }, label, menu)];
 }
 
 /**

@@ -150,10 +150,14 @@ def test_points_that_lie_on_a_curve_are_not_fitted() -> None:
     assert not axes.findobj(lambda candidate: candidate.get_gid() == "fit")
 
 
-def test_the_legend_counts_certified_brackets() -> None:
+def test_certified_brackets_look_different() -> None:
     points = [point(0.5, 0.36, certified=True), point(1.0, 0.7)]
     figure = phase_diagram(boundary(points), [])
-    assert "bracket (1 of 2 certified)" in [text.get_text() for text in figure.legends[0].get_texts()]
+    certified, other = (artist(figure.axes[0], name) for name in ("certified bracket", "bracket"))
+    assert [each[0][0] for each in certified.get_segments()] == [0.5]
+    assert [each[0][0] for each in other.get_segments()] == [1.0]
+    assert certified.get_linewidth() > 2 * other.get_linewidth()
+    assert {"certified bracket", "bracket"} < {text.get_text() for text in figure.legends[0].get_texts()}
 
 
 @pytest.mark.parametrize(
