@@ -4,15 +4,23 @@ Their inner loops are plain loops that LLVM turns into SIMD code.  This needs ``
 which every division has a branch for zero.  What is compiled is cached on disk for all processes.  The cache
 is a convenience: where it cannot be read or written, functions are compiled as if there were none.  The first
 run on a machine waits for compilation: this module's logger names each function at level INFO.
+
+The bits of a result must not depend on what was compiled or loaded before.  Therefore compiled functions are
+inlined where compiled code calls them (``forceinline=True``): of several copies of a function, optimized in
+several places, a process would take the one that it met first, and they round differently.  And one process
+compiles a function while the others wait for it, so that all have the same machine code.
 """
 
 from __future__ import annotations
 
+import fcntl
 import hashlib
 import logging
+import os
 import pickle
+import time
 from collections.abc import Callable
-from functools import cache
+from functools import cache, wraps
 from typing import Any
 
 from numba import njit, types
@@ -23,6 +31,9 @@ from numba.extending import intrinsic
 
 # Without "ninf" and "nnan": a run that diverges must show it.
 _FAST_MATH = {"reassoc", "contract", "nsz", "arcp"}
+
+_LONGEST_WAIT = 120.0  # seconds for another process to compile a function, which may have been stopped
+_LOOK_SECONDS = 0.02  # between two looks at whether it has
 
 _log = logging.getLogger(__name__)
 
@@ -43,11 +54,25 @@ def compiled(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     """
     if function is None:
         return lambda function: compiled(function, **options)
-    dispatcher = njit(nogil=True, error_model="numpy", fastmath=_FAST_MATH, **options)(function)
+    dispatcher = njit(nogil=True, error_model="numpy", fastmath=_FAST_MATH, forceinline=True, **options)(
+        function
+    )
     try:
-        dispatcher._cache = _ToleratedCache(function)
+        files = _ToleratedCache(function)
     except RuntimeError as error:  # no directory can be written to
         _say_once(str(error))
+        return dispatcher
+    dispatcher._cache = files
+    compile_or_load = dispatcher.compile
+
+    @wraps(compile_or_load)
+    def one_process_compiles(signature: Any) -> Any:
+        try:
+            return compile_or_load(signature)
+        finally:
+            files.unlock()
+
+    dispatcher.compile = one_process_compiles
     return dispatcher
 
 
@@ -70,10 +95,14 @@ def _say_once(reason: str) -> None:
 
 
 class _ToleratedCache(FunctionCache):
-    """Numba's cache, none of whose failures matters."""
+    """Numba's cache, none of whose failures matters.
+
+    A look for something that it does not have locks it, until `unlock`: what is missing will be compiled.
+    """
 
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)
+        self._lock: int | None = None
         self._cache_file = _CheckedFiles(
             cache_path=self._cache_path,
             filename_base=self._impl.filename_base,
@@ -81,6 +110,34 @@ class _ToleratedCache(FunctionCache):
         )
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
+        found = self._look(sig, target_context)
+        if found is None and self._locked():
+            found = self._look(sig, target_context)  # another process may have compiled it meanwhile
+        return found
+
+    def unlock(self) -> None:
+        """Let other processes look, which find what has been saved."""
+        if self._lock is not None:
+            os.close(self._lock)
+            self._lock = None
+
+    def _locked(self) -> bool:
+        """Wait until no other process compiles this function; False if that cannot be known."""
+        if self._lock is not None:
+            return False
+        try:
+            self._impl.locator.ensure_cache_path()
+            self._lock = os.open(self._cache_file.lock_path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+            give_up = time.monotonic() + _LONGEST_WAIT
+            while not _taken(self._lock):
+                if time.monotonic() > give_up:
+                    return False
+                time.sleep(_LOOK_SECONDS)
+        except OSError:
+            return False
+        return True
+
+    def _look(self, sig: Any, target_context: Any) -> Any:
         try:
             # Not by `FunctionCache.load_overload`, which first loads all that Numba can compile.  Only
             # compilation needs that, and does so itself; it takes a third of the start of a run.
@@ -96,8 +153,22 @@ class _ToleratedCache(FunctionCache):
             _say_once(error.strerror or str(error))
 
 
+def _taken(lock: int) -> bool:
+    """Take a lock, if no other process has it."""
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
+
+
 class _CheckedFiles(IndexDataCacheFile):
     """The files of one function's cache.  Machine code is only run if it is what was written."""
+
+    @property
+    def lock_path(self) -> str:
+        """Where the file lies that is locked while the function is compiled."""
+        return self._index_path + ".lock"
 
     def _load_index(self) -> Any:
         try:

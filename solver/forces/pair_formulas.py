@@ -125,7 +125,7 @@ def _(formula: Any, square: Any, parameters: Any) -> Callable[..., Derivatives]:
 
 @cache
 def _compiled(function: Callable[..., Derivatives]) -> Callable[..., Derivatives]:
-    dispatcher: Callable[..., Derivatives] = compiled(function, forceinline=True)
+    dispatcher: Callable[..., Derivatives] = compiled(function)
     return dispatcher
 
 

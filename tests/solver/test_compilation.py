@@ -19,6 +19,60 @@ def successor(x):
 print(successor(41), successor.stats.cache_hits.total())
 """
 
+SLOW_SOURCE = f"""
+import math
+from solver.compilation import compiled
+
+@compiled
+def settled(x):
+{"".join(f"    x = math.sqrt(x * x + {index}.0) + math.sin(x)" + chr(10) for index in range(600))}
+    return x
+
+@compiled
+def twice(x):
+    return 2.0 * settled(x)
+
+twice(1.0)
+print(twice.stats.cache_hits.total())
+"""
+
+# The velocity of one vesicle that 39 others cause, in part by series, which are too long to be inlined unless
+# they have to be.
+SERIES_SOURCE = """
+import hashlib, sys
+import numpy as np
+from solver.potentials import direct_sum, multipoles
+
+random = np.random.default_rng(1)
+points, forces = random.standard_normal((2, 40, 64)), random.standard_normal((40, 2, 64))
+centers = np.stack([4.0 * np.arange(40), np.zeros(40)])
+points += centers[:, :, None]
+coefficients, orders, velocity = random.standard_normal((40, 6, 64)), np.zeros((1, 40), np.int64), np.zeros((2, 1, 64))
+orders[0] = [-1] + 19 * [0] + 20 * [12]  # none of its own
+if "directly" in sys.argv:
+    direct_sum.velocity(points[:, 0].copy(), points[:, 1].copy(), forces[1])
+multipoles.velocity(points, forces, centers, coefficients, orders, 0, velocity)
+assert np.isfinite(velocity).all()
+print(hashlib.sha256(velocity).hexdigest())
+"""
+
+FAILING_SOURCE = """
+import subprocess, sys
+from numba.core.errors import TypingError
+from solver.compilation import compiled
+
+@compiled
+def successor(x):
+    return x + 1
+
+try:
+    successor("a")
+except TypingError:
+    if __name__ != "other":
+        other = "import runpy, sys; print(runpy.run_path(sys.argv[1], run_name='other')['successor'](41))"
+        subprocess.run([sys.executable, "-c", other, __file__], check=True, timeout=60)
+"""
+
 
 def run(script: Path, prefix: str = "") -> tuple[str, str]:
     result = subprocess.run(
@@ -98,3 +152,34 @@ def test_what_is_compiled_is_announced_and_what_is_cached_is_not(script: Path) -
     assert "compiling successor" in said.splitlines()
     _, said = run(script, loud)
     assert "compiling" not in said
+
+
+def test_one_of_several_processes_compiles_and_the_others_load(tmp_path: Path) -> None:
+    """The function takes some seconds to compile, so that all processes look for it before one has it."""
+    script = tmp_path / "script.py"
+    script.write_text(SLOW_SOURCE)
+    command = [sys.executable, "-c", f"import runpy; runpy.run_path({str(script)!r})"]
+    environment = os.environ | {
+        "PYTHONPATH": os.pathsep.join(sys.path),
+        "NUMBA_CACHE_DIR": str(tmp_path),
+    }
+    processes = [
+        subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) for _ in range(3)
+    ]
+    hits = sorted(process.communicate()[0].strip() for process in processes)
+    assert hits == ["0", "1", "1"]
+
+
+def test_bits_do_not_depend_on_what_was_compiled_or_loaded_before(tmp_path: Path) -> None:
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path), "NUMBA_CACHE_DIR": str(tmp_path)}
+    digests = [
+        subprocess.check_output([sys.executable, "-c", SERIES_SOURCE, *before], env=environment)
+        for before in ([], [], ["directly"], ["directly"])
+    ]
+    assert len(set(digests)) == 1
+
+
+def test_a_process_that_fails_to_compile_lets_the_others_try(tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(FAILING_SOURCE)
+    assert run(script) == ("42", "")
