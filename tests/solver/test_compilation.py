@@ -47,8 +47,8 @@ random = np.random.default_rng(1)
 points, forces = random.standard_normal((2, 40, 64)), random.standard_normal((40, 2, 64))
 centers = np.stack([4.0 * np.arange(40), np.zeros(40)])
 points += centers[:, :, None]
-coefficients, orders, velocity = random.standard_normal((40, 6, 64)), np.zeros((1, 40), np.int64), np.zeros((2, 1, 64))
-orders[0] = [-1] + 19 * [0] + 20 * [12]  # none of its own
+coefficients, velocity = random.standard_normal((40, 6, 64)), np.zeros((2, 1, 64))
+orders = np.array([[-1] + 19 * [0] + 20 * [12]])  # none of its own
 if "directly" in sys.argv:
     direct_sum.velocity(points[:, 0].copy(), points[:, 1].copy(), forces[1])
 multipoles.velocity(points, forces, centers, coefficients, orders, 0, velocity)
