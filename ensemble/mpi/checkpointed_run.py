@@ -14,7 +14,8 @@ from solver.simulation.simulate import Simulation
 
 if TYPE_CHECKING:
     from ensemble.store.checkpoint import Checkpoint
-    from solver.analysis.run import Run
+    from solver.analysis.record import Sink
+    from solver.analysis.run import RunResults
     from solver.memory import Saved
     from solver.parallel import Parallel
     from solver.scene import Scene
@@ -50,10 +51,12 @@ class CheckpointKeeper:
     ----------
     key : str
         Of the run.
+    record : RecordedBlocks
+        Takes what the run records.
     """
 
     def __init__(self, checkpoint: Checkpoint, order: Callable[[], Order]) -> None:
-        self.key = checkpoint.key
+        self.key, self.record = checkpoint.key, checkpoint.record
         self._checkpoint = checkpoint
         self._order = order
         self._interval = checkpoint_seconds()
@@ -119,9 +122,10 @@ class CheckpointKeeper:
 def checkpointed_run(
     scene: Scene,
     parallel: Parallel,
+    sink: Sink,
     keeper: CheckpointKeeper | None,
     on_progress: Callable[[float, float], None] | None = None,
-) -> Run:
+) -> RunResults:
     """Make a run, from its checkpoint on if there is one.
 
     Collective.
@@ -131,6 +135,8 @@ def checkpointed_run(
     scene : Scene
     parallel : Parallel
         The ranks that compute the run together.
+    sink : Sink
+        That takes what the run records, on this rank.
     keeper : CheckpointKeeper or None
         On the first rank.
     on_progress : callable, optional
@@ -138,7 +144,7 @@ def checkpointed_run(
 
     Returns
     -------
-    Run
+    RunResults
         On every rank.
 
     Raises
@@ -161,15 +167,15 @@ def checkpointed_run(
         if order in (Order.SUSPEND, Order.CANCEL):
             raise Stopped
 
-    return _begun(scene, parallel, keeper).complete(after_step)
+    return _begun(scene, parallel, sink, keeper).finish(after_step)
 
 
-def _begun(scene: Scene, parallel: Parallel, keeper: CheckpointKeeper | None) -> Simulation:
+def _begun(scene: Scene, parallel: Parallel, sink: Sink, keeper: CheckpointKeeper | None) -> Simulation:
     """Return the simulation as it was kept, or else at its start.  Collective."""
     saved = parallel.agree(keeper.read() if keeper else None)
     if saved is not None:
         try:
-            simulation = Simulation.restored(scene, saved, parallel=parallel)
+            simulation = Simulation.restored(scene, saved, parallel=parallel, sink=sink)
         except (LookupError, TypeError, ValueError, AttributeError) as error:
             if keeper:
                 keeper.begin_anew(f"another version wrote it ({type(error).__name__}: {error})")
@@ -177,4 +183,4 @@ def _begun(scene: Scene, parallel: Parallel, keeper: CheckpointKeeper | None) ->
             if keeper:
                 tell(f"run {keeper.key} goes on from its checkpoint at time {simulation.time:g}")
             return simulation
-    return Simulation(scene, parallel=parallel)
+    return Simulation(scene, parallel=parallel, sink=sink)

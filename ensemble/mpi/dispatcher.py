@@ -160,10 +160,11 @@ def _lead(groups: Groups, leaders: Intracomm, store: StoreOnRank) -> None:
 
 def _follow(groups: Groups) -> None:
     from ensemble.mpi.checkpointed_run import Stopped, checkpointed_run
+    from solver.analysis.record import Forgetful
 
     while isinstance(order := _wait(groups.group), Task):
         with suppress(Stopped):
-            checkpointed_run(order.scene, groups.parallel, None)
+            checkpointed_run(order.scene, groups.parallel, Forgetful(), None)
 
 
 def _wait(communicator: Intracomm) -> DispatcherOrder:
@@ -186,14 +187,13 @@ def _simulate(groups: Groups, leaders: Intracomm, store: StoreOnRank, task: Task
         return Order.GO_ON
 
     begin = time.perf_counter()
+    keeper = CheckpointKeeper(store.checkpoint(task.scene), order)
     try:
-        run = checkpointed_run(
-            task.scene, groups.parallel, CheckpointKeeper(store.checkpoint(task.scene), order)
-        )
+        run = checkpointed_run(task.scene, groups.parallel, keeper.record, keeper)
     except Stopped:
         return Unfinished(time.perf_counter() - begin)
     seconds = time.perf_counter() - begin
-    return Finished(store.stage(run), RunAnswer(run.outcome, run.sensitive), seconds)
+    return Finished(store.stage_recorded(run, keeper.record), RunAnswer(run.outcome, run.sensitive), seconds)
 
 
 class Dispatcher(Generic[SomeTask]):

@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from ensemble.mpi.checkpointed_run import CheckpointKeeper
     from ensemble.mpi.store_on_ranks import StoreOnRank
     from ensemble.store.run_record import RunSummary
-    from solver.analysis.run import Run
+    from solver.analysis.record import Sink
+    from solver.analysis.run import RunResults
     from solver.parallel import Parallel
 
 
@@ -71,19 +72,25 @@ def single_run(
     parallel = _first_ranks(communicator, ranks)
 
     from ensemble.store.run_record import RunSummary
+    from solver.analysis.record import SERIES, VESICLE_SERIES, Forgetful
 
+    nothing = Forgetful()
     if store is None:
-        run = _made(scene, parallel, None, on_progress)
-        return RunSummary.of(run) if run is not None and is_first else None
-    with EndRequests(communicator) as requests:
-        run = _made(scene, parallel, _keeper(store, scene, requests) if is_first else None, on_progress)
-        if on_root(communicator, lambda: run is None):
-            raise Interrupted(SUSPENDED_STATUS)
+        run = _made(scene, parallel, nothing, None, on_progress)
         if run is None or not is_first:
             return None
-        summary = RunSummary.of(run)
-        whole_store(store).save(run, summary)
-        return summary
+        return RunSummary.of_parts(run, nothing.names[SERIES], nothing.names.get(VESICLE_SERIES, ()))
+    with EndRequests(communicator) as requests:
+        keeper = _keeper(store, scene, requests) if is_first else None
+        run = _made(scene, parallel, keeper.record if keeper else nothing, keeper, on_progress)
+        if on_root(communicator, lambda: run is None):
+            raise Interrupted(SUSPENDED_STATUS)
+        if run is None or keeper is None:
+            return None
+        kept = whole_store(store)
+        staged = kept.stage_recorded(run, keeper.record)
+        kept.commit(staged)
+        return staged.summary
 
 
 def _keeper(store: StoreOnRank, scene: Scene, requests: EndRequests) -> CheckpointKeeper:
@@ -97,16 +104,17 @@ def _keeper(store: StoreOnRank, scene: Scene, requests: EndRequests) -> Checkpoi
 def _made(
     scene: Scene,
     parallel: Parallel | None,
+    sink: Sink,
     keeper: CheckpointKeeper | None,
     on_progress: Callable[[float, float], None],
-) -> Run | None:
+) -> RunResults | None:
     """Make a run on the ranks that have a part in it; None on the others, and if it was suspended."""
     from ensemble.mpi.checkpointed_run import Stopped, checkpointed_run
 
     if parallel is None:
         return None
     try:
-        return checkpointed_run(scene, parallel, keeper, on_progress if parallel.rank == 0 else None)
+        return checkpointed_run(scene, parallel, sink, keeper, on_progress if parallel.rank == 0 else None)
     except Stopped:
         return None
 

@@ -9,22 +9,9 @@ from pydantic import ValidationError
 
 from ensemble.config.run_key import DISTRIBUTION
 from ensemble.errors import OtherVersionError, StoreError
-from ensemble.store.run_record import RunSummary, arrays, first_problem, rebuild
-from ensemble.store.zarr_groups import StoredGroup, write_group
+from ensemble.store.run_record import RunSummary, first_problem, rebuild
+from ensemble.store.zarr_groups import StoredGroup
 from solver.analysis.run import Run
-
-
-def write_run(directory: Path, summary: RunSummary, run: Run) -> None:
-    """Write a run to a new directory.
-
-    Parameters
-    ----------
-    directory : Path
-    summary : RunSummary
-        Of the run.
-    run : Run
-    """
-    write_group(directory, summary.document(), arrays(run))
 
 
 class StoredArrays(StoredGroup):

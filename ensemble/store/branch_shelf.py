@@ -19,7 +19,8 @@ from ensemble.errors import StoreError
 from ensemble.search.branch_summary import BranchSummary, branch_key
 from ensemble.store.branch_record import branch_arrays
 from ensemble.store.run_record import first_problem
-from ensemble.store.staging import STORE_LOCK, is_own_directory
+from ensemble.store.staging import STORE_LOCK
+from ensemble.store.writers import is_own_directory
 from ensemble.store.zarr_groups import StoredGroup, write_group
 from solver.revision import RESULTS_REVISION
 

@@ -1,24 +1,29 @@
 """The checkpoint of a run in progress, from which it goes on to the bits that it would have had.
 
-It is one file, `checkpoints/KEY.h5` in the store, that holds what `solver.Simulation.saved` returns.  It is
-written to the directory of its writer in `staging/`, flushed and renamed, so that it is whole or the one
-before.  It is removed when its run is committed.  A run that is canceled because nobody needs it removes its
-own one, and leaves one that it has gone on from.
+It is one file, `checkpoints/KEY.h5` in the store, that holds the scene and what `solver.Simulation.saved`
+returns, and beside it the blocks of what the run has recorded (`recorded_blocks`).  It is written to the
+directory of its writer in `staging/`, flushed and renamed, so that it is whole or the one before.  It is
+removed when its run is committed.  A run that is canceled because nobody needs it removes its own one, and
+leaves one that it has gone on from.
 """
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ensemble.config.run_key import run_key
 from ensemble.disk import flush
 from ensemble.errors import StoreError
+from ensemble.store.writers import STAGING, is_own_directory, lives
 from solver.revision import RESULTS_REVISION
 
 if TYPE_CHECKING:
+    from ensemble.store.recorded_blocks import RecordedBlocks
     from solver.memory import Saved
     from solver.scene import Scene
 
@@ -37,6 +42,11 @@ class Checkpoint:
         Of the run.
     own_directory : callable
         Returns the directory in the store where this process may write.
+
+    Attributes
+    ----------
+    key : str
+        Of the run.
     """
 
     def __init__(self, store: Path, scene: Scene, own_directory: Callable[[], Path]) -> None:
@@ -44,6 +54,13 @@ class Checkpoint:
         self._store = store
         self._scene = scene
         self._own_directory = own_directory
+
+    @cached_property
+    def record(self) -> RecordedBlocks:
+        """What takes what the run records."""
+        from ensemble.store.recorded_blocks import RecordedBlocks
+
+        return RecordedBlocks(self._store / CHECKPOINTS / self.key, self._own_directory)
 
     def write(self, saved: Saved) -> None:
         """Put a state in the place of the one before.
@@ -63,13 +80,17 @@ class Checkpoint:
         path = checkpoint_path(self._store, self.key)
         path.parent.mkdir(exist_ok=True)
         unfinished = self._own_directory() / path.name
+        self.record.write()
+        scene = self._scene.model_dump_json()
+        content = {"scene": scene, "simulation": saved, "record": self.record.saved()}
         try:
-            write_plain(unfinished, saved, self._attributes())
+            write_plain(unfinished, content, self._attributes() | {"writer": self._own_directory().name})
             flush(unfinished)
             unfinished.replace(path)
         finally:
             unfinished.unlink(missing_ok=True)  # its space may be what lacks
         flush(path.parent)
+        sweep_blocks(self._store, self.key)
 
     def read(self) -> Saved | None:
         """Read the state.
@@ -96,13 +117,18 @@ class Checkpoint:
             for name, expected in self._attributes().items():
                 if attributes.get(name) != expected:
                     raise StoreError(f"it has the {name} {attributes.get(name)}, and not {expected}")
-            saved: Saved = read_plain(path)
+            content = read_plain(path)
         except UnreadableFileError as error:
             raise StoreError(f"it is damaged ({error})") from error
+        if not isinstance(content, dict) or "record" not in content:
+            raise StoreError("an earlier version wrote it")
+        self.record.take_over(content["record"])
+        saved: Saved = content["simulation"]
         return saved
 
     def remove(self) -> None:
-        """Remove it."""
+        """Remove it, and what this process has recorded."""
+        self.record.remove()
         remove_checkpoint(self._store, self.key)
 
     def _attributes(self) -> dict[str, str | int]:
@@ -140,7 +166,7 @@ def checkpoint_path(store: Path, key: str) -> Path:
 
 
 def remove_checkpoint(store: Path, key: str) -> None:
-    """Remove the checkpoint of a run, if there is one.
+    """Remove the checkpoint of a run, if there is one, and what processes that have ended recorded of it.
 
     Parameters
     ----------
@@ -151,7 +177,33 @@ def remove_checkpoint(store: Path, key: str) -> None:
     """
     # One that stays for whatever reason is removed when the store is opened next.
     with suppress(OSError):
-        checkpoint_path(store, key).unlink()
+        checkpoint_path(store, key).unlink(missing_ok=True)
+    sweep_blocks(store, key)
+
+
+def sweep_blocks(store: Path, key: str) -> None:
+    """Remove what processes that have ended recorded of a run, but for what its checkpoint counts.
+
+    Parameters
+    ----------
+    store : Path
+        Directory of the store.
+    key : str
+        Of the run.
+    """
+    place = store / CHECKPOINTS / key
+    with suppress(OSError):  # what stays for whatever reason is removed when the store is opened next
+        ended = [
+            directory
+            for directory in place.iterdir()
+            if is_own_directory(directory) and not lives(store / STAGING / directory.name)
+        ]
+        # A process that has ended writes no checkpoint any more: so this is looked at after that.
+        counted = _writer_of_checkpoint(store, key) if ended else None
+        for directory in ended:
+            if directory.name != counted:
+                shutil.rmtree(directory)
+        place.rmdir()
 
 
 def checkpointed_keys(store: Path) -> Iterator[str]:
@@ -169,3 +221,31 @@ def checkpointed_keys(store: Path) -> Iterator[str]:
     """
     for path in (store / CHECKPOINTS).glob(f"*{SUFFIX}"):
         yield path.stem
+
+
+def unfinished_keys(store: Path) -> set[str]:
+    """Find the runs that have a checkpoint, or of which something is recorded.
+
+    Parameters
+    ----------
+    store : Path
+        Directory of the store.
+
+    Returns
+    -------
+    set of str
+        Keys of runs.
+    """
+    recorded = (path.name for path in (store / CHECKPOINTS).glob("*") if is_own_directory(path))
+    return {*checkpointed_keys(store), *recorded}
+
+
+def _writer_of_checkpoint(store: Path, key: str) -> str | None:
+    """Return the name of the writer whose blocks a checkpoint counts; None if there is none that says it."""
+    from ensemble.store.plain_hdf5 import UnreadableFileError, read_attributes
+
+    try:
+        writer = read_attributes(checkpoint_path(store, key)).get("writer")
+    except UnreadableFileError:
+        return None
+    return writer if isinstance(writer, str) else None

@@ -42,7 +42,7 @@ def export_run(summary: RunSummary, run: Run, path: Path) -> None:
             for dimension, size in zip(array.dimensions, array.values.shape, strict=True):
                 if dimension not in file.dimensions:
                     file.dimensions[dimension] = size
-            variable = file.create_variable(name, array.dimensions, data=array.values)
+            variable = file.create_variable(name, array.dimensions, data=array.values[:])
             variable.attrs.update(array.attributes)
         for name, value in summary.document().items():
             file.attrs[name] = json.dumps(value)

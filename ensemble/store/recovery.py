@@ -1,8 +1,8 @@
 """What becomes of runs that are in the directory of a store but not in its catalog, and the other way round.
 
 Nothing that holds data is deleted.  A whole run without a row is adopted: its row is written.  What is no
-whole run is moved to `lost+found/`.  Only the unfinished staging of a dead process is removed, and the
-checkpoint of a run that is committed.
+whole run is moved to `lost+found/`.  Only the unfinished staging of a dead process is removed, the checkpoint
+of a run that is committed, and the record of an unfinished one that no checkpoint counts.
 """
 
 from __future__ import annotations
@@ -16,9 +16,14 @@ from uuid import uuid4
 from ensemble.disk import flush
 from ensemble.errors import OtherVersionError, StoreError
 from ensemble.store.catalog import Catalog
-from ensemble.store.checkpoint import checkpointed_keys, remove_checkpoint
+from ensemble.store.checkpoint import (
+    remove_checkpoint,
+    sweep_blocks,
+    unfinished_keys,
+)
 from ensemble.store.run_record import RunSummary
-from ensemble.store.staging import RUNS, STAGING, abandoned, is_own_directory, whole_runs
+from ensemble.store.staging import RUNS, whole_runs
+from ensemble.store.writers import STAGING, abandoned, is_own_directory
 
 LOST_AND_FOUND = "lost+found"
 
@@ -42,7 +47,8 @@ class Recovery:
     def recover(self) -> list[str]:
         """Adopt whole runs, set aside what is not one, and remove what dead processes left unfinished.
 
-        That is their staging, and checkpoints of runs that are committed.
+        That is their staging, checkpoints of runs that are committed, and what was recorded after the
+        checkpoints of others.
 
         Returns
         -------
@@ -57,9 +63,11 @@ class Recovery:
         for writer in abandoned(self._path / STAGING):
             adopted += [self._adopt_staged(directory, committed) for directory in whole_runs(writer)]
             shutil.rmtree(writer)
-        for key in checkpointed_keys(self._path):
+        for key in unfinished_keys(self._path):
             if key in committed:  # the process that committed it died before it could remove this
                 remove_checkpoint(self._path, key)
+            else:
+                sweep_blocks(self._path, key)
         if sum(adopted):
             done.append(f"adopted {sum(adopted)} runs that were not in the catalog of {self._path}")
         return done

@@ -13,10 +13,11 @@ from ensemble.store.catalog import Catalog
 from ensemble.store.listing import Listing
 from ensemble.store.recovery import Recovery
 from ensemble.store.sql_database import CATALOG, Place, is_file
-from ensemble.store.staging import RUNS, STAGING, STORE_LOCK
+from ensemble.store.staging import RUNS, STORE_LOCK
 from ensemble.store.store import Store
 from ensemble.store.store_directory import refused, require_catalog, require_writable
 from ensemble.store.verification import OnProgress, run_problems
+from ensemble.store.writers import STAGING
 
 
 def repair(path: Path, on_progress: OnProgress | None = None, processes: int = 1) -> list[str]:

@@ -4,16 +4,29 @@ from __future__ import annotations
 
 import json
 import platform
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import fields
 from importlib.metadata import version
-from typing import Annotated, Any, NamedTuple, Self
+from typing import Annotated, Any, NamedTuple, Protocol, Self
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from ensemble.config.run_key import DISTRIBUTION, run_key
 from ensemble.timestamp import Timestamp, now
 from solver.analysis.recorded import RECORDED
-from solver.analysis.run import Array, Energy, Errors, Frames, Outcome, Run, Viscosity, Work
+from solver.analysis.run import (
+    Array,
+    Energy,
+    Errors,
+    Frames,
+    Outcome,
+    Run,
+    RunResults,
+    Viscosity,
+    Work,
+)
 from solver.dimensions import LENGTH, TIME
 from solver.revision import RESULTS_REVISION
 from solver.scene import Scene, Units
@@ -101,6 +114,22 @@ class RunSummary(BaseModel):
         -------
         RunSummary
         """
+        return cls.of_parts(run, run.series, run.vesicle_series)
+
+    @classmethod
+    def of_parts(cls, run: RunResults, series: Iterable[str], vesicle_series: Iterable[str]) -> Self:
+        """Summarize a run that this process has just finished.
+
+        Parameters
+        ----------
+        run : RunResults
+        series, vesicle_series : iterable of str
+            Names of what it has recorded.
+
+        Returns
+        -------
+        RunSummary
+        """
         results = {name: getattr(run, name) for name in RESULTS}
         versions = {package: version(package) for package in RESULT_PACKAGES}
         return cls(
@@ -108,8 +137,8 @@ class RunSummary(BaseModel):
             created=now(),
             versions=versions | {"python": platform.python_version()},
             results_revision=RESULTS_REVISION,
-            series=tuple(sorted(run.series)),
-            vesicle_series=tuple(sorted(run.vesicle_series)),
+            series=tuple(sorted(series)),
+            vesicle_series=tuple(sorted(vesicle_series)),
             **results,
         )
 
@@ -119,19 +148,49 @@ _OTHERS = ("key", "created", "versions", "results_revision", "series", "vesicle_
 RESULTS = tuple(name for name in RunSummary.model_fields if name not in _OTHERS)
 
 
+class Rows(Protocol):
+    """An array, in memory or elsewhere, whose rows are read a few at a time.
+
+    Attributes
+    ----------
+    shape : tuple of int
+    dtype : numpy.dtype
+    """
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """The length of each dimension."""
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """The type of the numbers."""
+
+    def __getitem__(self, rows: slice, /) -> NDArray[Any]:
+        """Return successive rows.
+
+        Parameters
+        ----------
+        rows : slice
+
+        Returns
+        -------
+        array
+        """
+
+
 class NamedArray(NamedTuple):
     """An array and the names of its dimensions.
 
     Attributes
     ----------
     dimensions : tuple of str
-    values : array
+    values : Rows
     attributes : dict
         JSON data, such as the units.
     """
 
     dimensions: tuple[str, ...]
-    values: Array
+    values: Rows
     attributes: dict[str, Any] = {}  # noqa: RUF012  it is never changed
 
 
@@ -155,21 +214,35 @@ def arrays(run: Run) -> dict[str, NamedArray]:
     -------
     dict of str to NamedArray
     """
-    units = run.scene.units
-    frames = {
-        "frame_time": run.frames.time,
-        "tangent_angle": run.frames.tangent_angle,
-        "center": run.frames.center,
-        "tension": run.frames.tension,
+    parts = {
+        "series": run.series,
+        "vesicle_series": run.vesicle_series,
+        "frames": {field.name: getattr(run.frames, field.name) for field in fields(run.frames)},
     }
-    series = {name: NamedArray(("time",), values) for name, values in run.series.items()}
-    vesicle_series = {
-        name: NamedArray(("time", "vesicle", "axis")[: values.ndim], values)
-        for name, values in run.vesicle_series.items()
-    }
+    return named_arrays(parts, run.scene.units)
+
+
+def named_arrays(parts: Mapping[str, Mapping[str, Rows]], units: Units | None) -> dict[str, NamedArray]:
+    """Return the arrays of a record by the names that they have in files.
+
+    Parameters
+    ----------
+    parts : mapping of str to mapping of str to Rows
+        The series, vesicle series and frames of a `Run`.
+    units : Units or None
+        Of its scene.
+
+    Returns
+    -------
+    dict of str to NamedArray
+    """
+    frames = {"frame_time" if name == "time" else name: values for name, values in parts["frames"].items()}
     named = (
-        series
-        | vesicle_series
+        {name: NamedArray(("time",), values) for name, values in parts["series"].items()}
+        | {
+            name: NamedArray(("time", "vesicle", "axis")[: len(values.shape)], values)
+            for name, values in parts.get("vesicle_series", {}).items()
+        }
         | {name: NamedArray(FRAME_DIMENSIONS[name], values) for name, values in frames.items()}
     )
     return {name: array._replace(attributes=_attributes(name, units)) for name, array in named.items()}

@@ -9,10 +9,9 @@ from __future__ import annotations
 
 import fcntl
 import os
-import re
 import shutil
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,20 +24,18 @@ from tenacity import Retrying, retry_if_exception_type, stop_after_delay, wait_e
 from ensemble.disk import flush, flush_tree, locked
 from ensemble.errors import StoreError
 from ensemble.store.checkpoint import Checkpoint
-from ensemble.store.run_record import RunSummary
-from solver.analysis.run import Run
+from ensemble.store.run_record import NamedArray, RunSummary, arrays, named_arrays
+from ensemble.store.writers import STAGING, WRITER_LOCK, is_own_directory
 
 if TYPE_CHECKING:
+    from ensemble.store.recorded_blocks import RecordedBlocks
+    from solver.analysis.run import Run, RunResults
     from solver.scene import Scene
 
 RUNS = "runs"
-STAGING = "staging"
 STORE_LOCK = "store.lock"
-WRITER_LOCK = "writer.lock"
 PARTIAL = ".partial"
 DISK_SECONDS = 60  # for which writing is tried again while the database or the disk does not take it
-
-_NAME = re.compile(r"[0-9a-f]{32}")  # of directories that this module makes
 
 
 @dataclass(frozen=True)
@@ -99,24 +96,52 @@ class RunStaging(AbstractContextManager["RunStaging"]):
             If the run could not be written for `DISK_SECONDS`.  It is kept in the directory for temporary
             files, if it can be.
         """
-        summary = RunSummary.of(run) if summary is None else summary
+        return self._stage(RunSummary.of(run) if summary is None else summary, arrays(run))
+
+    def stage_recorded(self, results: RunResults, record: RecordedBlocks) -> Staged:
+        """Write a run to disk of which this process has recorded the arrays; see `stage`.
+
+        Parameters
+        ----------
+        results : RunResults
+        record : RecordedBlocks
+            Its files are removed.
+
+        Returns
+        -------
+        Staged
+
+        Raises
+        ------
+        StoreError
+            As of `stage`, or if a file of the record is damaged.
+        """
+        parts = record.parts(results.work.points)
+        staged = self._stage(
+            RunSummary.of_parts(results, parts["series"], parts.get("vesicle_series", ())),
+            named_arrays(parts, results.scene.units),
+        )
+        record.remove()
+        return staged
+
+    def _stage(self, summary: RunSummary, named: Mapping[str, NamedArray]) -> Staged:
         try:
-            return patiently(OSError)(self._stage_once, run, summary)
+            return patiently(OSError)(self._stage_once, summary, named)
         except OSError as error:
-            place = _kept_elsewhere(run, summary)
+            place = _kept_elsewhere(summary, named)
             kept = "is lost" if place is None else f"is kept in {place}: move it into {self.path / RUNS}"
             trouble = error.strerror or error
             raise StoreError(
                 f"run {summary.key}: {self.path} does not take it ({trouble}), and it {kept}"
             ) from error
 
-    def _stage_once(self, run: Run, summary: RunSummary) -> Staged:
-        from ensemble.store.archive import write_run
+    def _stage_once(self, summary: RunSummary, named: Mapping[str, NamedArray]) -> Staged:
+        from ensemble.store.zarr_groups import write_group
 
         whole = self.directory() / uuid4().hex
         partial = whole.with_suffix(PARTIAL)
         try:
-            write_run(partial, summary, run)
+            write_group(partial, summary.document(), named)
             flush_tree(partial)
             partial.rename(whole)
         except OSError:
@@ -194,13 +219,13 @@ def patiently(*trouble: type[Exception]) -> Retrying:
     )
 
 
-def _kept_elsewhere(run: Run, summary: RunSummary) -> Path | None:
+def _kept_elsewhere(summary: RunSummary, named: Mapping[str, NamedArray]) -> Path | None:
     """Write a run to the directory for temporary files, and return where; None if that fails, too."""
-    from ensemble.store.archive import write_run
+    from ensemble.store.zarr_groups import write_group
 
     try:
         place = Path(mkdtemp(prefix="ensemble-run-"), summary.key)
-        write_run(place, summary, run)
+        write_group(place, summary.document(), named)
     except OSError:
         return None
     return place
@@ -221,48 +246,3 @@ def whole_runs(directory: Path) -> Iterator[Path]:
     """
     with suppress(FileNotFoundError):
         yield from (entry for entry in directory.iterdir() if is_own_directory(entry))
-
-
-def is_own_directory(path: Path) -> bool:
-    """Tell whether a path is a directory with a name as the store gives it: 32 hexadecimal digits.
-
-    Parameters
-    ----------
-    path : Path
-        An entry of `runs/`, of `staging/` or of a writer's directory.  Links do not count.
-
-    Returns
-    -------
-    bool
-    """
-    return bool(_NAME.fullmatch(path.name)) and path.is_dir() and not path.is_symlink()
-
-
-def abandoned(staging: Path) -> Iterator[Path]:
-    """Find the directories of writers that no longer live.
-
-    Parameters
-    ----------
-    staging : Path
-        The directory `staging/` of a store, whose lock the caller holds.
-
-    Returns
-    -------
-    iterator of Path
-        Directories that writers made.  Everything else in `staging/` is left alone.
-    """
-    return (entry for entry in staging.iterdir() if is_own_directory(entry) and _has_no_writer(entry))
-
-
-def _has_no_writer(directory: Path) -> bool:
-    try:
-        descriptor = os.open(directory / WRITER_LOCK, os.O_RDWR)
-    except OSError:  # no lock file: not a writer's; or it belongs to somebody else
-        return False
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    finally:
-        os.close(descriptor)
-    return True

@@ -31,15 +31,18 @@ from ensemble.store.reading import readable, validated
 from ensemble.store.recovery import Recovery
 from ensemble.store.run_record import RunSummary
 from ensemble.store.sql_database import UNUSABLE, Place, reason
-from ensemble.store.staging import RUNS, STAGING, STORE_LOCK, RunStaging, Staged, patiently
+from ensemble.store.staging import RUNS, STORE_LOCK, RunStaging, Staged, patiently
 from ensemble.store.store_directory import create, exists, refused, require_catalog, require_writable
+from ensemble.store.writers import STAGING
 from solver.analysis.run import Outcome, Run
 
 if TYPE_CHECKING:
     from ensemble.search.branch_summary import BranchSummary
     from ensemble.store.archive import StoredArrays
     from ensemble.store.branch_shelf import BranchShelf
+    from ensemble.store.recorded_blocks import RecordedBlocks
     from ensemble.store.verification import OnProgress
+    from solver.analysis.run import RunResults
     from solver.scene import Scene
     from solver.simulation.steady_scenes import SteadyBranch
 
@@ -167,6 +170,20 @@ class Store(AbstractContextManager["Store"]):
         Staged
         """
         return self._staging.stage(run, summary)
+
+    def stage_recorded(self, results: RunResults, record: RecordedBlocks) -> Staged:
+        """Write a run of which this process has recorded the arrays; see `RunStaging.stage_recorded`.
+
+        Parameters
+        ----------
+        results : RunResults
+        record : RecordedBlocks
+
+        Returns
+        -------
+        Staged
+        """
+        return self._staging.stage_recorded(results, record)
 
     def checkpoint(self, scene: Scene) -> Checkpoint:
         """Return the checkpoint of a run; see `RunStaging.checkpoint`.

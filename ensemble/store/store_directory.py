@@ -14,7 +14,8 @@ from ensemble.disk import flush, locked, require_space
 from ensemble.errors import FULL, StoreError, StoreInputError
 from ensemble.store.catalog import Catalog
 from ensemble.store.sql_database import CATALOG, PLACE, UNUSABLE, Place, is_file, reason
-from ensemble.store.staging import RUNS, STAGING, STORE_LOCK
+from ensemble.store.staging import RUNS, STORE_LOCK
+from ensemble.store.writers import STAGING
 
 
 def exists(path: Path) -> bool:

@@ -9,6 +9,7 @@ Earlier versions wrote the same content as files of the directory itself.  Those
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import closing, contextmanager
@@ -22,7 +23,7 @@ from zarr.codecs import ZstdCodec
 from zarr.storage import LocalStore, ZipStore
 
 from ensemble.errors import StoreError
-from ensemble.store.run_record import NamedArray
+from ensemble.store.run_record import NamedArray, Rows
 from ensemble.store.written_arrays import DAMAGE, read_written
 from solver.analysis.run import Array
 
@@ -30,15 +31,15 @@ ARCHIVE = "zarr.zip"
 CHUNK_BYTES = 1 << 20
 
 
-def _chunks(values: Array) -> tuple[int, ...]:
+def _chunks(values: Rows) -> tuple[int, ...]:
     """Chunk shape of at most about `CHUNK_BYTES`, cut along the first dimension (time) only."""
-    bytes_each = max(values[:1].nbytes, 1)
+    bytes_each = max(values.dtype.itemsize * math.prod(values.shape[1:]), 1)
     rows = min(max(CHUNK_BYTES // bytes_each, 1), values.shape[0])
     return tuple(max(length, 1) for length in (rows, *values.shape[1:]))
 
 
 def write_group(directory: Path, attributes: dict[str, Any], arrays: Mapping[str, NamedArray]) -> None:
-    """Write a group.
+    """Write a group, chunk by chunk.
 
     Parameters
     ----------
@@ -57,10 +58,12 @@ def write_group(directory: Path, attributes: dict[str, Any], arrays: Mapping[str
 
 
 def _write_array(group: zarr.Group, name: str, array: NamedArray) -> None:
-    group.create_array(
+    values, chunks = array.values, _chunks(array.values)
+    stored = group.create_array(
         name,
-        data=np.ascontiguousarray(array.values),
-        chunks=_chunks(array.values),
+        shape=values.shape,
+        dtype=values.dtype,
+        chunks=chunks,
         # The checksum turns a flipped bit into an error instead of a different number.
         compressors=ZstdCodec(level=3, checksum=True),
         dimension_names=array.dimensions,
@@ -69,6 +72,9 @@ def _write_array(group: zarr.Group, name: str, array: NamedArray) -> None:
         # Every chunk is written, so a missing one is a loss and never an array of fill values.
         config={"write_empty_chunks": True},
     )
+    for begin in range(0, values.shape[0], chunks[0]):
+        rows = slice(begin, min(begin + chunks[0], values.shape[0]))
+        stored[rows] = np.ascontiguousarray(values[rows])
 
 
 class StoredGroup:

@@ -23,6 +23,7 @@ Quantity = Callable[[Array], float]  # of a state
 _SAFETY = 3.0  # factor within which an estimated error is trusted
 _SAMPLES = 16  # of a turn; what is averaged over it is smooth
 _FEWEST_SAMPLES = 4
+_MOST_SAMPLES = 1024  # that are kept to choose from; of a longer turn every other step, or fewer
 _REST = 0.1  # share of the errors at single instants that an average keeps
 _LARGEST = 1e-2  # root mean square of the error of a state with which quantities change linearly
 _LARGEST_TRANSVERSE = 0.1  # root mean square; the pair may be on the way to another state
@@ -30,6 +31,7 @@ _PART = 1e-3  # of a step, over which a quantity is taken to change linearly
 
 
 class _Sample(NamedTuple):
+    number: int  # of the step
     time: float
     state: Array
     error: Array  # (state_size, 2), see `Step`
@@ -50,12 +52,15 @@ class AnswerErrors(Remembering):
         large as the estimated one.
     """
 
-    memory = ("_at_passages", "_samples", "_separation", "sensitive")
+    memory = ("_at_passages", "_samples", "_steps", "_every", "_size", "_separation", "sensitive")
 
     def __init__(self, tracker: RevolutionTracker | None) -> None:
         self._tracker = tracker
         self._at_passages: list[Array] = []
         self._samples: list[_Sample] = []
+        self._steps = 0
+        self._every = 1  # of so many steps one is kept
+        self._size = 0  # of the last state
         self._separation: Array | None = None
         self.sensitive = False
 
@@ -80,12 +85,19 @@ class AnswerErrors(Remembering):
         tracker = self._tracker
         if tracker is None or step.error is None:
             return
-        for time in tracker.passages[len(self._at_passages) :]:
-            self._at_passages.append(_time_error(step, time, tracker.angle_of) if time > 0 else np.zeros(2))
-            begin = tracker.passages[-3] if len(tracker.passages) > 2 else 0.0
+        for time in tracker.latest:
+            error_of_time = _time_error(step, time, tracker.angle_of) if time > 0 else np.zeros(2)
+            self._at_passages = [*self._at_passages, error_of_time][-3:]
+        if tracker.latest:
+            begin = tracker.passages[-3:][0]
             self._samples = [sample for sample in self._samples if sample.time >= begin]
+            if len(self._samples) < _MOST_SAMPLES // 4:
+                self._every = max(self._every // 2, 1)
         error = step.error(step.end)
-        self._samples.append(_Sample(step.end, step.state, error))
+        if tracker.passages:  # what was before the first one is in no turn
+            self._keep(_Sample(self._steps, step.end, step.state, error))
+        self._steps += 1
+        self._size = step.state.size
         if isinstance(tracker, LineOfCenters):
             self._follow_distance(step, error, tracker)
             self.sensitive |= _transverse_error(step, error[:, 0]) > _LARGEST_TRANSVERSE
@@ -118,11 +130,12 @@ class AnswerErrors(Remembering):
         if self.period is None or self._tracker is None:
             return None
         first, last = self._tracker.passages[-3], self._tracker.passages[-1]
-        size = self._samples[-1].state.size
-        inside = [s for s in self._samples if first <= s.time <= last and s.state.size == size]
+        inside = [s for s in self._samples if first <= s.time <= last and s.state.size == self._size]
         if len(inside) < _FEWEST_SAMPLES:
             return None
-        chosen = [inside[k] for k in np.unique(np.linspace(0, len(inside) - 1, _SAMPLES).astype(int))]
+        numbers = np.array([s.number for s in inside])
+        wanted = numbers[0] + np.linspace(0, numbers[-1] - numbers[0], _SAMPLES).astype(int)
+        chosen = [inside[k] for k in np.unique(np.searchsorted(numbers, wanted))]
         values = np.array([quantity(s.state) for s in chosen])
         changes = np.array([change_of(quantity, s.state, s.error) for s in chosen])
         if not np.all(np.isfinite(changes)):
@@ -138,6 +151,13 @@ class AnswerErrors(Remembering):
         # What only delays the motion cancels in an average, but not to the last digit.
         rest = _REST * float(np.abs(changes[:, 0]).mean())
         return float(np.hypot(magnitude(change + shifts / duration), rest))
+
+    def _keep(self, sample: _Sample) -> None:
+        if sample.number % self._every == 0:
+            self._samples.append(sample)
+        if len(self._samples) > _MOST_SAMPLES:
+            self._every *= 2
+            self._samples = [each for each in self._samples if each.number % self._every == 0]
 
     def _follow_distance(self, step: Step, error: Array, line: LineOfCenters) -> None:
         """Take in the distance at the end of a step, where the state has an error (state_size, 2)."""

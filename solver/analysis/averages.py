@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.analysis.rheology import viscosity_of
-from solver.analysis.run import Outcome, Series, Viscosity
+from solver.analysis.run import Outcome, Viscosity
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from solver.analysis.revolutions import RevolutionTracker
     from solver.analysis.viscosity_history import ViscosityHistory
     from solver.scene import Scene
@@ -34,13 +36,16 @@ def pair_inclination(center_angle: Array) -> Array:
     return np.asarray(90 + np.degrees(np.arcsin(np.abs(np.sin(center_angle)))))
 
 
-def inclination(scene: Scene, series: Series, tracker: RevolutionTracker | None = None) -> float | None:
+def inclination(
+    scene: Scene, sample: Mapping[str, float], tracker: RevolutionTracker | None = None
+) -> float | None:
     """Return the inclination at the end: of a single vesicle's long axis against x, or of a pair in strain.
 
     Parameters
     ----------
     scene : Scene
-    series : Series
+    sample : mapping of str to float
+        The last diagnostics, by the name of their series.
     tracker : RevolutionTracker or None
         See `revolves`; None for a state at rest.
 
@@ -49,27 +54,28 @@ def inclination(scene: Scene, series: Series, tracker: RevolutionTracker | None 
     float or None
         Degrees; of a pair that of `pair_inclination`.  None where neither exists.
     """
-    if "inclination_angle" in series:
-        return float(np.degrees(series["inclination_angle"][-1]))
+    if "inclination_angle" in sample:
+        return float(np.degrees(sample["inclination_angle"]))
     strains = scene.imposed_flow is not None and scene.imposed_flow.strains
-    if strains and "center_angle" in series and not revolves(scene, tracker):
-        return float(pair_inclination(series["center_angle"][-1]))
+    if strains and "center_angle" in sample and not revolves(scene, tracker):
+        return float(pair_inclination(np.array(sample["center_angle"])))
     return None
 
 
-def steady_viscosity(series: Series) -> Viscosity | None:
-    """Return the intrinsic viscosity of a steady state, that of the last sample.
+def steady_viscosity(sample: Mapping[str, float]) -> Viscosity | None:
+    """Return the intrinsic viscosity of a steady state.
 
     Parameters
     ----------
-    series : Series
+    sample : mapping of str to float
+        The last diagnostics, by the name of their series.
 
     Returns
     -------
     Viscosity or None
         None without shear.
     """
-    parts = {name: float(series[name][-1]) for name in series if name.startswith("viscosity_")}
+    parts = {name: value for name, value in sample.items() if name.startswith("viscosity_")}
     return viscosity_of(parts) if parts else None
 
 
@@ -110,7 +116,7 @@ def is_at_rest(scene: Scene, outcome: Outcome, tracker: RevolutionTracker | None
 
 def viscosity(
     scene: Scene,
-    series: Series,
+    sample: Mapping[str, float],
     outcome: Outcome,
     tracker: RevolutionTracker | None,
     history: ViscosityHistory | None,
@@ -120,8 +126,8 @@ def viscosity(
     Parameters
     ----------
     scene : Scene
-    series : Series
-        Whose last sample is that at the end of the run.
+    sample : mapping of str to float
+        The diagnostics at the end of the run.
     outcome : Outcome
     tracker : RevolutionTracker or None
         Of the pair's line of centers or the single vesicle's long axis, where one was followed.
@@ -136,7 +142,7 @@ def viscosity(
     if history is None:
         return None
     if is_at_rest(scene, outcome, tracker):
-        return steady_viscosity(series)
+        return steady_viscosity(sample)
     if tracker:
         return history.average(*tracker.last_turn) if tracker.last_turn else None
-    return history.average(scene.horizon / 2, float(series["time"][-1]))
+    return history.average(scene.horizon / 2, sample["time"])

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.analysis.revolutions import CountedDirection, RevolutionTracker, crossing, greatest
+from solver.analysis.settling import KEPT_HALF_TURNS
 
 if TYPE_CHECKING:
     from solver.integrators import Step
@@ -38,7 +39,7 @@ class LineOfCenters(RevolutionTracker):
     distance : float
         At the end of the last step.
     openings : list of float
-        The largest distance in each half turn from one passage to the next, continuous in time.
+        The largest distance in each of the last half turns from one passage to the next, continuous in time.
     separated : bool
         Whether the distance has passed the separated distance, or 1.5 times that at the start if that is
         more.
@@ -81,20 +82,20 @@ class LineOfCenters(RevolutionTracker):
         if self.distance_of(step.state) >= self.separated_distance:
             self.separated = True
             step = step.until(crossing(step, lambda state: self.distance_of(state) - self.separated_distance))
-        known = len(self.passages)
         step = super().advance(step)
         self.distance = self.distance_of(step.state)
-        self._follow_opening(step, known)
+        self._follow_opening(step)
         return step
 
     @property
     def cycle(self) -> Array:
-        """What characterizes each half turn, (half turns, 2): logarithms of its duration and opening."""
+        """What characterizes each of the last half turns, (n, 2): logarithms of its duration and opening."""
         return np.column_stack([super().cycle, np.log(self.openings)])
 
-    def _follow_opening(self, step: Step, known: int) -> None:
-        """Take in the distances of a step; the passages from the index ``known`` on are in it."""
-        times = [step.start, *self.passages[known:], step.end]
+    def _follow_opening(self, step: Step) -> None:
+        """Take in the distances of a step."""
+        times = [step.start, *self.latest, step.end]
+        known = self.count - len(self.latest)
         for index, (first, last) in enumerate(pairwise(times)):
             if index > 0:
                 self._end_half_turn(known + index - 1)
@@ -102,7 +103,7 @@ class LineOfCenters(RevolutionTracker):
 
     def _end_half_turn(self, passage: int) -> None:
         if passage > 0:  # before the first passage there is no half turn
-            self.openings.append(self._opening)
+            self.openings = [*self.openings, self._opening][-KEPT_HALF_TURNS:]
         self._opening = 0.0
 
     def distance_of(self, state: Array) -> float:

@@ -1,4 +1,4 @@
-"""Collects the diagnostics and the states of a run while it goes on."""
+"""Measures the states of a run while it goes on, and hands the diagnostics and frames to a sink."""
 
 from __future__ import annotations
 
@@ -9,13 +9,12 @@ from numpy.typing import NDArray
 
 from solver.analysis.contacts import cluster_sizes
 from solver.analysis.diagnostics import measures, vesicle_measures
-from solver.analysis.run import Frames, Series, VesicleSeries
+from solver.analysis.record import FRAMES, SERIES, VESICLE_SERIES, OpenBlock
 from solver.analysis.settling import state_rate
 from solver.analysis.spatial_error import shape_tails, spatial_error
 from solver.membrane.geometry import Geometry
-from solver.membrane.resampling import resampled_angle, resampled_state
+from solver.membrane.resampling import resampled_state
 from solver.membrane.restoring import shape_rates
-from solver.membrane.spectral import resampled
 from solver.membrane.symmetry import independent_vesicles
 from solver.memory import Remembering
 from solver.motion.equation import EquationOfMotion, Motion
@@ -25,6 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from solver.analysis.line_of_centers import LineOfCenters
+    from solver.analysis.record import Sink
     from solver.integrators import Step
     from solver.scene import Scene
 
@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 
 
 class Recorder(Remembering):
-    """Collects diagnostics, and states as frames.
+    """Measures states, and hands diagnostics and frames over block by block.
 
     Parameters
     ----------
@@ -41,13 +41,19 @@ class Recorder(Remembering):
         Of this scene.
     line_of_centers : LineOfCenters or None
         Of two vesicles.
+    sink : Sink
+        That takes what is recorded.
     origin : callable or None
         From a time to where the origin of the states lies in the fluid, (2,); None if it stays at 0.
 
     Attributes
     ----------
-    samples : dict
-        Values of the diagnostics so far by the name of their series.
+    sample : dict of str to float
+        The last values of the diagnostics, by the name of their series; empty before the first ones.
+    frame : dict of str to float or array
+        The last frame: a row of `solver.analysis.run.Frames`.
+    largest : dict of str to float
+        The largest values so far of the errors of area and closure.
     spatial_error : float
         The largest so far; see `solver.analysis.run.Errors`.
     spatial_position_error : float
@@ -55,12 +61,15 @@ class Recorder(Remembering):
     """
 
     memory = (
-        "samples",
+        "sample",
+        "frame",
+        "largest",
         "spatial_error",
         "spatial_position_error",
-        "_vesicle_samples",
-        "_frames",
         "_previous",
+        "_series",
+        "_vesicle_series",
+        "_frames",
     )
 
     def __init__(
@@ -68,16 +77,20 @@ class Recorder(Remembering):
         scene: Scene,
         equation: EquationOfMotion,
         line_of_centers: LineOfCenters | None,
+        sink: Sink,
         origin: Callable[[float], Array] | None = None,
     ) -> None:
         self._scene = scene
         self._line_of_centers = line_of_centers
         self._origin = origin
         self._vesicle_measures = vesicle_measures(scene)
-        self._frames: list[tuple[float, Array, Array, Array]] = []
+        self._series = OpenBlock(SERIES, sink)
+        self._vesicle_series = OpenBlock(VESICLE_SERIES, sink)
+        self._frames = OpenBlock(FRAMES, sink)
         self._previous: tuple[float, Array] | None = None
-        self._vesicle_samples: dict[str, list[Array]] = {}
-        self.samples: dict[str, list[float]] = {}
+        self.sample: dict[str, float] = {}
+        self.frame: dict[str, float | Array] = {}
+        self.largest = {"area_error": 0.0, "closure_error": 0.0}
         self.spatial_error = self.spatial_position_error = 0.0
         self._shape_rates = shape_rates(independent_vesicles(scene), scene)
         self._take_equation(equation)
@@ -93,6 +106,8 @@ class Recorder(Remembering):
         if self._previous:
             time, state = self._previous
             self._previous = time, resampled_state(self._membranes, state, equation.membranes)
+        if equation.membranes.points != self._membranes.points:
+            self._frames.hand_over()  # those of a block have the same number of points
         self._take_equation(equation)
 
     def _take_equation(self, equation: EquationOfMotion) -> None:
@@ -134,7 +149,7 @@ class Recorder(Remembering):
         step : Step
         """
         interval = self._scene.output.interval
-        recorded = round(self.samples["time"][-1] / interval)
+        recorded = round(self.sample["time"] / interval)
         for index in range(recorded + 1, int(np.floor(step.end / interval)) + 1):
             time = index * interval
             # At its end the interpolant differs from the state by round-off.
@@ -148,33 +163,50 @@ class Recorder(Remembering):
         time : float
         state : (state_size,)
         """
-        if time > self.samples["time"][-1]:
+        if time > self.sample["time"]:
             self.record(time, state)
-        if time > self._frames[-1][0]:
+        if time > self.frame["time"]:
             self._keep(time, state, self._equation.motion(state))
 
+    def hand_over(self) -> None:
+        """Give all that is recorded to the sink."""
+        for block in (self._series, self._vesicle_series, self._frames):
+            block.hand_over()
+
     def _record(self, time: float, state: Array, motion: Motion) -> None:
-        self._append("time", time)
-        for name, measure in self._measures.items():
-            self._append(name, measure(motion))
-        for name, measure_each in self._vesicle_measures.items():
-            self._vesicle_samples.setdefault(name, []).append(measure_each(motion))
-        if self._origin and "vesicle_center" in self._vesicle_samples:
-            centers = self._vesicle_samples["vesicle_center"]
-            centers[-1] = centers[-1] + self._origin(time)
+        sample = {"time": float(time)}
+        sample |= {name: float(measure(motion)) for name, measure in self._measures.items()}
         if self._line_of_centers:
-            self._append("center_distance", self._line_of_centers.distance_of(state))
-            self._append("center_angle", self._line_of_centers.angle_of(state))
+            sample["center_distance"] = self._line_of_centers.distance_of(state)
+            sample["center_angle"] = self._line_of_centers.angle_of(state)
         # Between samples: at one, the rate of a stiff state magnifies the noise of the integrator.
         if self._previous:
             change, duration = state - self._previous[1], time - self._previous[0]
         else:
             change, duration = motion.rate, 1.0
-        self._append("state_rate", state_rate(self._membranes, change, duration))
+        sample["state_rate"] = state_rate(self._membranes, change, duration)
         self._previous = time, state
+        if self._vesicle_measures:
+            sample |= self._record_vesicles(time, motion)
+        self.sample = sample
+        self._series.add(sample)
+        self.largest = {
+            name: float(np.maximum(so_far, sample[name])) for name, so_far in self.largest.items()
+        }
         self._assess_resolution(time, state, motion)
         if self._frame_is_due(time):
             self._keep(time, state, motion)
+
+    def _record_vesicles(self, time: float, motion: Motion) -> dict[str, float]:
+        """Record what is measured of each vesicle; return the diagnostics of all that follow from it."""
+        row = {name: measure(motion) for name, measure in self._vesicle_measures.items()}
+        if self._origin and "vesicle_center" in row:
+            row["vesicle_center"] = row["vesicle_center"] + self._origin(time)
+        self._vesicle_series.add(row)
+        if "vesicle_cluster" not in row:
+            return {}
+        sizes = cluster_sizes(row["vesicle_cluster"])
+        return {"clusters": float(len(sizes)), "largest_cluster": float(sizes.max())}
 
     def _assess_resolution(self, time: float, state: Array, motion: Motion) -> None:
         """Note how well the points resolve the shapes, the waists, and adhesion at the smallest gap."""
@@ -193,45 +225,21 @@ class Recorder(Remembering):
         centers = membranes.curve_center(state)
         if self._origin:
             centers = centers + self._origin(time)
-        self._frames.append((time, membranes.curve_tangent_angle(state), centers, tension))
-
-    def _append(self, name: str, value: float) -> None:
-        self.samples.setdefault(name, []).append(value)
+        self.frame = {
+            "time": time,
+            "tangent_angle": membranes.curve_tangent_angle(state),
+            "center": centers,
+            "tension": tension,
+        }
+        self._frames.add(self.frame)
 
     def _frame_is_due(self, time: float) -> bool:
-        if not self._frames:
+        if not self.frame:
             return True
         # Round-off in a multiple of the interval must not skip a frame.
         interval = self._scene.output.frame_interval
-        due, last = (np.floor(t / interval + 1e-9) for t in (time, self._frames[-1][0]))
+        due, last = (np.floor(t / interval + 1e-9) for t in (time, self.frame["time"]))
         return bool(due > last)
-
-    @property
-    def series(self) -> Series:
-        """All diagnostics."""
-        series = {name: np.array(values) for name, values in self.samples.items()}
-        if "vesicle_cluster" in self._vesicle_samples:
-            sizes = [cluster_sizes(labels) for labels in self._vesicle_samples["vesicle_cluster"]]
-            series["clusters"] = np.array([float(len(of_sample)) for of_sample in sizes])
-            series["largest_cluster"] = np.array([float(of_sample.max()) for of_sample in sizes])
-        return series
-
-    @property
-    def vesicle_series(self) -> VesicleSeries:
-        """All diagnostics of each vesicle."""
-        return {name: np.array(values) for name, values in self._vesicle_samples.items()}
-
-    @property
-    def frames(self) -> Frames:
-        """All recorded states, with the last one's number of points."""
-        time, tangent_angle, center, tension = zip(*self._frames, strict=True)
-        points = self._membranes.points
-        return Frames(
-            np.array(time),
-            np.array([resampled_angle(angle, points) for angle in tangent_angle]),
-            np.array(center),
-            np.array([resampled(values, points) for values in tension]),
-        )
 
 
 def _unknown_motion(geometry: Geometry) -> Motion:

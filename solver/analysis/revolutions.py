@@ -10,7 +10,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
-from solver.analysis.settling import has_settled
+from solver.analysis.settling import KEPT_HALF_TURNS, has_settled
 from solver.membrane import curve
 from solver.memory import Remembering
 from solver.roots import root
@@ -84,13 +84,17 @@ class RevolutionTracker(Remembering, ABC):
         At the end of the last step; radians, unwrapped.
     passages : list of float
         Times at which the line first came to stand in the counted direction, or opposite to it, and then
-        after each further half turn.
+        after each further half turn: the last ones, as many as anything is decided by.
+    count : int
+        Of all passages.
+    latest : list of float
+        Those in the last step.
     membranes : Membranes
         Those of the steps.  Set it when the number of points changes.
     """
 
     direction_period: float
-    memory: ClassVar[tuple[str, ...]] = ("angle", "passages", "_first")
+    memory: ClassVar[tuple[str, ...]] = ("angle", "passages", "count", "_first")
 
     def __init__(self, membranes: Membranes, state: Array, counted: CountedDirection) -> None:
         self.membranes = membranes
@@ -99,6 +103,8 @@ class RevolutionTracker(Remembering, ABC):
         # A start in the counted direction is no passage, whatever its round-off.
         self._first = np.floor(self._half_turns(self.angle) + _ROUND_OFF) + 1
         self.passages: list[float] = []
+        self.latest: list[float] = []
+        self.count = 0
 
     @abstractmethod
     def _direction(self, state: Array) -> float:
@@ -117,8 +123,11 @@ class RevolutionTracker(Remembering, ABC):
             The part that was followed.
         """
         angle = self.angle_of(step.state)
-        while self._half_turns(angle) >= self._first + len(self.passages):
-            self.passages.append(crossing(step, self._beyond_next_passage))
+        self.latest = []
+        while self._half_turns(angle) >= self._first + self.count:
+            self.latest.append(crossing(step, self._beyond_next_passage))
+            self.count += 1
+        self.passages = [*self.passages, *self.latest][-KEPT_HALF_TURNS - 1 :]
         self.angle = angle
         return step
 
@@ -141,7 +150,7 @@ class RevolutionTracker(Remembering, ABC):
     @property
     def half_turns(self) -> int:
         """Number of half turns from one passage to the next."""
-        return max(len(self.passages) - 1, 0)
+        return max(self.count - 1, 0)
 
     @property
     def last_turn(self) -> tuple[float, float] | None:
@@ -155,7 +164,7 @@ class RevolutionTracker(Remembering, ABC):
 
     @property
     def cycle(self) -> Array:
-        """What characterizes each half turn, (half turns, quantities): the logarithm of its duration."""
+        """What characterizes each of the last half turns, (n, quantities): the logarithm of its duration."""
         return np.log(np.diff(self.passages))[:, None]
 
     def has_settled(self, change: float) -> bool:
@@ -177,7 +186,7 @@ class RevolutionTracker(Remembering, ABC):
         return self._counted.sense * (angle - self._counted.angle) / np.pi
 
     def _beyond_next_passage(self, state: Array) -> float:
-        return self._half_turns(self.angle_of(state)) - (self._first + len(self.passages))
+        return self._half_turns(self.angle_of(state)) - (self._first + self.count)
 
 
 class LongAxisTracker(RevolutionTracker):

@@ -185,9 +185,9 @@ class Frames:
     tension: Array
 
 
-@dataclass(frozen=True)
-class Run:
-    """A finished simulation.  Quantities that the scene does not have are None.
+@dataclass(frozen=True, kw_only=True)
+class RunResults:
+    """What a finished simulation came to, without what it recorded.  What the scene does not have is None.
 
     Attributes
     ----------
@@ -214,11 +214,6 @@ class Run:
     energy : Energy
     error : Errors
     work : Work
-    series : Series
-        Diagnostics against time.
-    frames : Frames
-    vesicle_series : VesicleSeries
-        Diagnostics of each vesicle against time.
     sensitive : bool
         Whether the outcome could be another one: a pair would have stayed together or come apart
         with three times the estimated error.
@@ -238,10 +233,25 @@ class Run:
     energy: Energy
     error: Errors
     work: Work
-    series: Series
-    frames: Frames
-    vesicle_series: VesicleSeries = field(default_factory=dict)
     perturbations: tuple[float, ...] = ()
     sensitive: bool = False
     settled: bool | None = None
     undecided: str | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run(RunResults):
+    """A finished simulation: its results, and what it recorded.
+
+    Attributes
+    ----------
+    series : Series
+        Diagnostics against time.
+    frames : Frames
+    vesicle_series : VesicleSeries
+        Diagnostics of each vesicle against time.
+    """
+
+    series: Series
+    frames: Frames
+    vesicle_series: VesicleSeries = field(default_factory=dict)

@@ -14,6 +14,8 @@ Array = NDArray[np.float64]
 
 # Half turns after which a motion may repeat itself: one, or two where they alternate.
 _CYCLES = (1, 2)
+_COMPARED = 3  # cycles
+KEPT_HALF_TURNS = _COMPARED * max(_CYCLES)  # that decide whether a motion has settled
 # Changes below this fraction of the tolerance may be those of the numerical error, which do not shrink.
 _NEGLIGIBLE = 0.1
 # A change above this multiple of the tolerance may be followed by a small one by chance.  Below it, motion
@@ -73,8 +75,9 @@ def convergence(half_turns: Array) -> list[Convergence]:
     """
     found = []
     for cycle in _CYCLES:
-        if len(half_turns) >= 3 * cycle:
-            earlier, previous, last = half_turns[-3 * cycle :].reshape(3, cycle, -1)
+        if len(half_turns) >= _COMPARED * cycle:
+            compared = half_turns[-_COMPARED * cycle :].reshape(_COMPARED, cycle, -1)
+            earlier, previous, last = compared
             change, before = np.abs(last - previous).max(), np.abs(previous - earlier).max()
             found.append(Convergence(float(change), float(before)))
     return found

@@ -34,7 +34,7 @@ def errors_of(scene: Scene, loop: TimeLoop, outcome: Outcome) -> Errors:
     -------
     Errors
     """
-    series, recorder = loop.recorder.series, loop.recorder
+    recorder = loop.recorder
     of_answers: dict[str, float | None] = {}
     if loop.error is not None and outcome is not Outcome.FAILED:
         temporal = position_error(loop.segment.membranes, loop.state, loop.error)
@@ -45,8 +45,8 @@ def errors_of(scene: Scene, loop: TimeLoop, outcome: Outcome) -> Errors:
             of_answers["period"] = loop.answer_errors.period
         of_answers["time"] = loop.answer_errors.separation
     return Errors(
-        area=float(series["area_error"].max()),
-        closure=float(series["closure_error"].max()),
+        area=recorder.largest["area_error"],
+        closure=recorder.largest["closure_error"],
         temporal=loop.temporal_error,
         spatial=recorder.spatial_error,
         **of_answers,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Self
@@ -11,23 +11,25 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.analysis import averages
-from solver.analysis.run import HOPELESS_SPATIAL, LARGEST_SPATIAL, Energy, Outcome, Run, Work
+from solver.analysis.record import Forgetful, InMemory
+from solver.analysis.run import HOPELESS_SPATIAL, LARGEST_SPATIAL, Outcome, RunResults
 from solver.forces.tension import TensionNotFoundError
 from solver.integrators import StepFailedError
 from solver.membrane.geometry import Membranes
-from solver.motion.terms import accurate_equation, equation_of_motion
+from solver.motion.terms import accurate_equation
 from solver.parallel import SERIAL, Parallel, first_rank_asks
 from solver.simulation.blas_threads import one_blas_thread
 from solver.simulation.initial_state import initial_ellipses, rotated_state
 from solver.simulation.moving_frame import MovingFrame
 from solver.simulation.resolution import UnresolvedError, resolution_of, with_points
-from solver.simulation.run_errors import errors_of
+from solver.simulation.run_results import results_of
 from solver.simulation.time_loop import TimeLoop
 from solver.steady_states.rest import HiddenInstabilityError, rest_near
 from solver.steady_states.steady_equations import SteadyEquations
 
 if TYPE_CHECKING:
+    from solver.analysis.record import Sink
+    from solver.analysis.run import Run
     from solver.memory import Saved
     from solver.scene import Scene
     from solver.steady_states.rest import Rest
@@ -86,21 +88,24 @@ class Simulation:
     scene : Scene
     parallel : Parallel
         The ranks that compute the run together.
+    sink : Sink, optional
+        That takes what is recorded, on this rank.  Left out, the simulation keeps it.
     """
 
-    def __init__(self, scene: Scene, *, parallel: Parallel = SERIAL) -> None:
+    def __init__(self, scene: Scene, *, parallel: Parallel = SERIAL, sink: Sink | None = None) -> None:
         self._relaxation: Simulation | None = None
-        self._prepare(scene, parallel, 0.0)
+        self._prepare(scene, parallel, sink, 0.0)
         with one_blas_thread():
             points = self._resolution.points
             if self._within.start.relaxed:
-                self._relaxation = Simulation(_at_rest(self._within), parallel=parallel)
+                self._relaxation = Simulation(_at_rest(self._within), parallel=parallel, sink=Forgetful())
             else:
                 self._begin(_Start(points, initial_ellipses(with_points(self._within, points))))
 
-    def _prepare(self, scene: Scene, parallel: Parallel, elapsed: float) -> None:
+    def _prepare(self, scene: Scene, parallel: Parallel, sink: Sink | None, elapsed: float) -> None:
         """Set what the scene alone decides, and the wall time that is used up."""
         self._scene, self._parallel = scene, parallel
+        self._sink = InMemory() if sink is None else sink
         self._began = clock.perf_counter() - elapsed
         self._frame = MovingFrame.of_scene(scene)
         self._within = self._frame.scene if self._frame else scene
@@ -150,9 +155,26 @@ class Simulation:
                     self._loop.recorder.finish(self._loop.time, self._loop.state)
             except _NUMERICAL_FAILURES as error:
                 self._failure = _failure(self._loop, error)
+            if self.done:
+                self._loop.recorder.hand_over()
 
     def complete(self, after_step: Callable[[Simulation], None] | None = None) -> Run:
         """Take all steps that are left, and return the run.
+
+        Parameters
+        ----------
+        after_step : callable, optional
+            See `finish`.
+
+        Returns
+        -------
+        Run
+        """
+        self.finish(after_step)
+        return self.run()
+
+    def finish(self, after_step: Callable[[Simulation], None] | None = None) -> RunResults:
+        """Take all steps that are left, and return what the run came to.
 
         Parameters
         ----------
@@ -162,14 +184,31 @@ class Simulation:
 
         Returns
         -------
-        Run
+        RunResults
         """
         with one_blas_thread():
             while not self.done:
                 self.step()
                 if after_step:
                     after_step(self)
-            return self.run()
+            return self.results()
+
+    def results(self) -> RunResults:
+        """Return what the run came to.
+
+        Returns
+        -------
+        RunResults
+
+        Raises
+        ------
+        ValueError
+            If it is not done.
+        """
+        if self._loop is None or not self.done:
+            raise ValueError(f"the run is at time {self.time:g} and not done: take further steps")
+        with one_blas_thread():
+            return results_of(self._scene, self._loop, self._failure, self._start_evaluations, self._elapsed)
 
     def run(self) -> Run:
         """Return the run.
@@ -181,12 +220,11 @@ class Simulation:
         Raises
         ------
         ValueError
-            If it is not done.
+            If it is not done, or another sink has what it recorded.
         """
-        if self._loop is None or not self.done:
-            raise ValueError(f"the run is at time {self.time:g} and not done: take further steps")
-        with one_blas_thread():
-            return _finished(self._scene, self._loop, self._failure, self._start_evaluations, self._elapsed)
+        if not isinstance(self._sink, InMemory):
+            raise ValueError("what the run recorded is in the sink that the simulation was given")
+        return self._sink.run(self.results())
 
     def saved(self) -> Saved:
         """Return everything that decides the steps to come.
@@ -210,10 +248,13 @@ class Simulation:
                 "start_points": self._start_points,
                 "start_evaluations": self._start_evaluations,
                 "loop": self._loop.saved() if self._loop else None,
+                "sink": self._sink.saved(),
             }
 
     @classmethod
-    def restored(cls, scene: Scene, saved: Saved, *, parallel: Parallel = SERIAL) -> Self:
+    def restored(
+        cls, scene: Scene, saved: Saved, *, parallel: Parallel = SERIAL, sink: Sink | None = None
+    ) -> Self:
         """Go on with a simulation that was saved.
 
         Parameters
@@ -224,6 +265,8 @@ class Simulation:
             As `saved` returned it.
         parallel : Parallel
             The ranks that go on together.
+        sink : Sink, optional
+            Of the kind that it had on the rank that saved it.
 
         Returns
         -------
@@ -232,16 +275,20 @@ class Simulation:
         simulation = cls.__new__(cls)
         simulation._relaxation = None
         with one_blas_thread():
-            simulation._prepare(scene, parallel, saved["wall_seconds"])
+            simulation._prepare(scene, parallel, sink, saved["wall_seconds"])
             if saved["relaxation"]:
                 relaxing = _at_rest(simulation._within)
-                simulation._relaxation = cls.restored(relaxing, saved["relaxation"], parallel=parallel)
+                simulation._relaxation = cls.restored(
+                    relaxing, saved["relaxation"], parallel=parallel, sink=Forgetful()
+                )
+                simulation._sink.restore(saved["sink"])
                 return simulation
             simulation._start_points = saved["start_points"]
             simulation._start_evaluations = saved["start_evaluations"]
             placed = with_points(simulation._within, simulation._start_points)
             simulation._loop = simulation._time_loop(placed, initial_ellipses(placed))
             simulation._loop.restore(saved["loop"])
+            simulation._sink.restore(saved["sink"])  # last: one that fails leaves it as it is
         return simulation
 
     @property
@@ -254,7 +301,13 @@ class Simulation:
         if not self._relaxation.done:
             self._relaxation.step()
         if self._relaxation.done:
-            start = _relaxed_start(self._within, self._resolution.points, self._relaxation.run())
+            assert self._relaxation._loop
+            start = _relaxed_start(
+                self._within,
+                self._resolution.points,
+                self._relaxation.results(),
+                self._relaxation._loop.recorder.frame,
+            )
             self._relaxation = None
             self._begin(start)
 
@@ -271,15 +324,16 @@ class Simulation:
             loop.begin()
         except _NUMERICAL_FAILURES as error:
             self._failure = _failure(loop, error)
+        if self.done:
+            loop.recorder.hand_over()
 
     def _time_loop(self, placed: Scene, state: Array) -> TimeLoop:
         """Return the loop from a state on."""
         scene = self._scene
-        equation_of = partial(equation_of_motion, parallel=self._parallel)
         # A circle has no other shape near: there is nothing to examine.
         has_circle = any(vesicle.is_circle for vesicle in scene.vesicles)
         examine = None if scene.many or has_circle else partial(_examined, self._within)
-        return TimeLoop(placed, state, self._resolution, equation_of, self._parallel, self._frame, examine)
+        return TimeLoop(placed, state, self._resolution, self._parallel, self._sink, self._frame, examine)
 
 
 @dataclass(frozen=True)
@@ -318,18 +372,23 @@ def _at_rest(scene: Scene) -> Scene:
     )
 
 
-def _relaxed_start(scene: Scene, points: int, relaxed: Run) -> _Start:
-    """Return where a run begins that needs this number of points for the vesicles as they are placed."""
+def _relaxed_start(
+    scene: Scene, points: int, relaxed: RunResults, frame: Mapping[str, float | Array]
+) -> _Start:
+    """Return where a run begins that needs this number of points for the vesicles as they are placed.
+
+    The frame is the last one of the relaxation.
+    """
     evaluations = relaxed.work.rhs_evaluations
     if relaxed.outcome is not Outcome.EQUILIBRIUM:
         reason = relaxed.failure or f"{relaxed.outcome} at time {relaxed.time:g}"
         placed = initial_ellipses(with_points(scene, points))
         return _Start(points, placed, evaluations, f"start: the pair did not relax ({reason})")
-    frames = relaxed.frames
-    points = frames.tangent_angle.shape[-1]
+    tangent_angle, center = np.asarray(frame["tangent_angle"]), np.asarray(frame["center"])
+    points = tangent_angle.shape[-1]
     membranes = Membranes.of_scene(with_points(scene, points))
     computed = slice(membranes.count)  # the others are images
-    last = membranes.pack(frames.tangent_angle[-1, computed], frames.center[-1, computed])
+    last = membranes.pack(tangent_angle[computed], center[computed])
     return _Start(points, rotated_state(membranes, last, scene.start.tilt), evaluations)
 
 
@@ -343,54 +402,9 @@ def _examined(scene: Scene, membranes: Membranes, state: Array) -> Rest:
 def _failure(loop: TimeLoop, error: Exception) -> str:
     """Return why a run failed, and see to it that at least its start is recorded."""
     recorder = loop.recorder
-    if not recorder.samples:
+    if not recorder.sample:
         recorder.record_geometry(loop.time, loop.state)
     points, spatial = loop.segment.membranes.points, recorder.spatial_error
     if spatial > LARGEST_SPATIAL:
         return f"{error} ({points} points do not resolve the scene: spatial error {spatial:.1e})"
     return str(error)
-
-
-def _finished(
-    scene: Scene, loop: TimeLoop, failure: str | None, evaluations_before: int, wall_seconds: float
-) -> Run:
-    outcome = loop.outcome if failure is None else Outcome.FAILED
-    series = loop.recorder.series
-    flow = scene.imposed_flow
-    rotates = flow is not None and flow.rotates
-    period = loop.tracker.period if loop.tracker and rotates else None
-    done = loop.segment.work
-    return Run(
-        scene=scene,
-        outcome=outcome,
-        failure=failure,
-        undecided=loop.undecided if failure is None else None,
-        time=loop.time,
-        period=period,
-        settled=loop.settled if period else None,
-        effective_aspect_ratio=flow.effective_aspect_ratio(period) if flow and period else None,
-        inclination_angle=averages.inclination(scene, series, loop.tracker),
-        gap=float(series["gap"][-1]) if "gap" in series else None,
-        viscosity=averages.viscosity(scene, series, outcome, loop.tracker, loop.viscosities),
-        energy=Energy(
-            bending=float(series["bending_energy"][-1]),
-            adhesion=float(series["adhesion_energy"][-1]) if "adhesion_energy" in series else None,
-        ),
-        error=errors_of(scene, loop, outcome),
-        sensitive=loop.answer_errors.sensitive,
-        work=Work(
-            steps=loop.steps,
-            rejected_steps=loop.rejected_steps,
-            rhs_evaluations=evaluations_before + done.evaluations + done.recordings,
-            jacobian_evaluations=done.jacobians,
-            factorizations=done.factorizations,
-            tension_iterations=done.tension_iterations,
-            wall_seconds=wall_seconds,
-            smallest_step=loop.smallest_step,
-            points=loop.segment.membranes.points,
-        ),
-        series=series,
-        frames=loop.recorder.frames,
-        vesicle_series=loop.recorder.vesicle_series,
-        perturbations=tuple(loop.perturbations),
-    )

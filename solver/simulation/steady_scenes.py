@@ -200,23 +200,23 @@ def _described(scene: Scene, equations: SteadyEquations, state: Array) -> Steady
     equation, membranes = equations.equation, equations.membranes
     perturbations = Perturbations.of(equations, state)
     motion = equation.motion(state)
-    series = {name: np.array([measure(motion)]) for name, measure in measures(scene, equation).items()}
+    sample = {name: float(measure(motion)) for name, measure in measures(scene, equation).items()}
     tails = shape_tails(membranes, state)
     shapes = Shapes(membranes.tangent_angle(state), membranes.center(state))
     if len(scene.vesicles) == 2:
         offset = shapes.center[1] - shapes.center[0]
-        series["center_angle"] = np.array([np.arctan2(offset[1], offset[0])])
+        sample["center_angle"] = float(np.arctan2(offset[1], offset[0]))
     return SteadyState(
         scene=scene,
         outcome=outcome_at_rest(scene, membranes, state),
         stable=perturbations.stable,
         eigenvalues=perturbations.eigenvalues[:_KEPT_EIGENVALUES],
-        inclination_angle=averages.inclination(scene, series),
-        gap=float(series["gap"][0]) if "gap" in series else None,
-        viscosity=averages.steady_viscosity(series),
+        inclination_angle=averages.inclination(scene, sample),
+        gap=sample.get("gap"),
+        viscosity=averages.steady_viscosity(sample),
         energy=Energy(
-            bending=float(series["bending_energy"][0]),
-            adhesion=float(series["adhesion_energy"][0]) if "adhesion_energy" in series else None,
+            bending=sample["bending_energy"],
+            adhesion=sample.get("adhesion_energy"),
         ),
         spatial_error=float(spatial_error(tails, age=np.full_like(tails, np.inf)).max()),
         shapes=shapes,

@@ -24,13 +24,15 @@ from solver.analysis.viscosity_history import ViscosityHistory
 from solver.integrators import Step, StepFailedError
 from solver.membrane.resampling import resampled_state
 from solver.memory import Remembering, Saved
-from solver.parallel import Parallel, require_agreement
+from solver.motion.terms import equation_of_motion
+from solver.parallel import require_agreement
 from solver.simulation.resolution import Resolution, with_points
 from solver.simulation.segment import Segment, SegmentWork
 
 if TYPE_CHECKING:
+    from solver.analysis.record import Sink
     from solver.membrane.geometry import Membranes
-    from solver.motion.equation import EquationOfMotion
+    from solver.parallel import Parallel
     from solver.scene import Scene
     from solver.simulation.moving_frame import MovingFrame
     from solver.steady_states.rest import Rest
@@ -49,10 +51,10 @@ class TimeLoop(Remembering):
         At time 0, with these points.
     resolution : Resolution
         Asks for more points.
-    equation_of : callable
-        From a scene whose number of points is given to its `EquationOfMotion`.
     parallel : Parallel
         The ranks that compute the run together.
+    sink : Sink
+        That takes what is recorded.
     frame : MovingFrame or None
         In which the scene is given; None for one that is at rest.
     examine : callable or None
@@ -107,14 +109,13 @@ class TimeLoop(Remembering):
         scene: Scene,
         state: Array,
         resolution: Resolution,
-        equation_of: Callable[[Scene], EquationOfMotion],
         parallel: Parallel,
+        sink: Sink,
         frame: MovingFrame | None = None,
         examine: Callable[[Membranes, Array], Rest] | None = None,
     ) -> None:
         self._scene = scene
         self._resolution = resolution
-        self._equation_of = equation_of
         self._parallel = parallel
         self._frame = frame
         self._examine = examine
@@ -122,7 +123,7 @@ class TimeLoop(Remembering):
         self.time = 0.0
         self.state = state
         self.outcome = Outcome.UNDECIDED
-        self.segment = Segment(equation_of(scene), scene, SegmentWork())
+        self.segment = Segment(equation_of_motion(scene, parallel=parallel), scene, SegmentWork())
         membranes = self.segment.membranes
         counted = counted_direction(scene.flow)
         self._line_of_centers = (
@@ -133,10 +134,12 @@ class TimeLoop(Remembering):
         self._long_axis = LongAxisTracker(membranes, state, counted) if may_tumble(scene) else None
         self.tracker: RevolutionTracker | None = self._line_of_centers or self._long_axis
         self.recorder = Recorder(
-            scene, self.segment.equation, self._line_of_centers, frame.origin if frame else None
+            scene, self.segment.equation, self._line_of_centers, sink, frame.origin if frame else None
         )
         in_shear = scene.flow is not None and scene.flow.shear_rate
         self.viscosities = ViscosityHistory(scene, self.segment.equation) if in_shear else None
+        if self.viscosities and not self.tracker:
+            self.viscosities.mark(scene.horizon / 2)
         self.steps = self.rejected_steps = 0
         self.smallest_step: float | None = None
         self.temporal_error = 0.0
@@ -244,7 +247,7 @@ class TimeLoop(Remembering):
 
     def _take_segment(self, points: int) -> None:
         """Begin the part of the run that has this number of points."""
-        equation = self._equation_of(with_points(self._scene, points))
+        equation = equation_of_motion(with_points(self._scene, points), parallel=self._parallel)
         self.segment = Segment(equation, self._scene, self.segment.work)
         self.recorder.continue_with(self.segment.equation)
         if self.viscosities:
@@ -264,6 +267,8 @@ class TimeLoop(Remembering):
             self._frame.follow(step, self.segment.membranes)
         self.recorder.record_up_to(step)
         if self.viscosities and self._enters_averages(step):
+            for time in self.tracker.latest if self.tracker else ():
+                self.viscosities.mark(time)
             self.viscosities.follow(step)
         self.time, self.state = step.end, step.state
         self.error = step.error(step.end) if step.error else None
@@ -295,7 +300,7 @@ class TimeLoop(Remembering):
             time=self.time,
             state=self.state,
             membranes=self.segment.membranes,
-            samples=self.recorder.samples,
+            sample=self.recorder.sample,
             line_of_centers=self._line_of_centers,
             long_axis=self._long_axis,
             examine=partial(self._examine, self.segment.membranes, self.state) if self._examine else None,

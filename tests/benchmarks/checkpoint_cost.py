@@ -34,7 +34,8 @@ def main() -> None:
     with Store.open(options.directory) as store:
         for preset, changes, steps in SCENES:
             scene = load_scene(preset, changes)
-            simulation, checkpoint = Simulation(scene), store.checkpoint(scene)
+            checkpoint = store.checkpoint(scene)
+            simulation = Simulation(scene, sink=checkpoint.record)
             for _ in range(steps):
                 simulation.step()
             seconds = []
@@ -46,7 +47,7 @@ def main() -> None:
             begin = time.perf_counter()
             saved = checkpoint.read()
             assert saved is not None
-            Simulation.restored(scene, saved)
+            Simulation.restored(scene, saved, sink=checkpoint.record)
             restored = time.perf_counter() - begin
             print(
                 f"{preset} {' '.join(changes)}, step {steps}: {size / 1e6:.2f} MB, written in "

@@ -49,8 +49,10 @@ class Cut:
 
 SHEAR = {"horizon": 150.0, "criteria.revolutions": 1000}
 BRIEF = {"numerics.points": 32, "numerics.tolerance": 1e-4}
+DENSE = {"output.interval": 0.003, "output.frame_interval": 0.01}
 CUTS = {
     "doublet in shear": Cut("doublet-shear", SHEAR),
+    "dense record": Cut("doublet-shear", BRIEF | DENSE | {"horizon": 30.0, "criteria.revolutions": 1000}),
     "trap, relaxed start": Cut("doublet-trap", {"numerics.tolerance": 1e-5}),
     "automatic points": Cut("doublet-shear", SHEAR | {"numerics.points": '"auto"'}),
     "24 vesicles, two ranks": Cut("suspension-shear", {"arrangement.count": 24, "horizon": 1.0}, ranks=2),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -35,9 +35,9 @@ class History:
         At that time.
     membranes : Membranes
         Those of the state.
-    samples : mapping from name to sequence of float
-        The recorded diagnostics, ``time`` among them; `solver.analysis.run.Series` names them.  A criterion
-        that reads them depends on how often a scene is recorded; none of this package does.
+    sample : mapping from name to float
+        The diagnostics that were recorded last, ``time`` among them; `solver.analysis.run.Series` names them.
+        A criterion that reads them depends on how often a scene is recorded; none of this package does.
     line_of_centers : LineOfCenters or None
         Of two vesicles.
     long_axis : LongAxisTracker or None
@@ -50,7 +50,7 @@ class History:
     time: float
     state: Array
     membranes: Membranes
-    samples: Mapping[str, Sequence[float]]
+    sample: Mapping[str, float]
     line_of_centers: LineOfCenters | None
     long_axis: LongAxisTracker | None
     examine: Callable[[], Rest] | None = None

@@ -32,7 +32,7 @@ def stopped(staging: RunStaging, order: Order, steps: int) -> bool:
         staging.checkpoint(PAIR), lambda: order if next(calls) == steps else Order.GO_ON
     )
     with pytest.raises(Stopped):
-        checkpointed_run(PAIR, SERIAL, keeper)
+        checkpointed_run(PAIR, SERIAL, keeper.record, keeper)
     return checkpoint_path(staging.path, keeper.key).exists()
 
 

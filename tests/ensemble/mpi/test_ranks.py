@@ -78,6 +78,7 @@ import sys
 from pathlib import Path
 from ensemble.mpi.world import abort_guard, world
 from ensemble.mpi.checkpointed_run import CheckpointKeeper, Order, Stopped, checkpointed_run
+from solver.analysis.record import Forgetful
 from ensemble.mpi.ranks import Ranks
 from ensemble.store import RunStaging
 from tests.ensemble.mpi.rank_comparison import DOUBLET
@@ -89,7 +90,8 @@ with abort_guard(communicator), RunStaging(Path(sys.argv[1])) as staging:
         return Order.CANCEL if len(asked) == 3 else Order.GO_ON
     keeper = CheckpointKeeper(staging.checkpoint(DOUBLET), order) if communicator.Get_rank() == 0 else None
     try:
-        checkpointed_run(DOUBLET, Ranks(communicator), keeper)
+        sink = keeper.record if keeper else Forgetful()
+        checkpointed_run(DOUBLET, Ranks(communicator), sink, keeper)
     except Stopped:
         print(f" cancelled {len(asked)} ", end="")
 """

@@ -25,6 +25,8 @@ pytestmark = pytest.mark.usefixtures("finished_study")  # the kernels are compil
 CUT = [
     ("doublet in shear", signal.SIGTERM),
     ("doublet in shear", signal.SIGKILL),
+    ("dense record", signal.SIGTERM),
+    ("dense record", signal.SIGKILL),
     ("trap, relaxed start", signal.SIGTERM),
     ("trap, relaxed start", signal.SIGKILL),
     ("24 vesicles, two ranks", signal.SIGTERM),

@@ -23,7 +23,7 @@ class Close(Criterion):
         return len(scene.vesicles) == 2
 
     def decide(self, history: History) -> Outcome | None:
-        return Outcome.BOUND if history.samples["gap"][-1] < CLOSE else None
+        return Outcome.BOUND if history.sample["gap"] < CLOSE else None
 
 
 @pytest.fixture
