@@ -60,14 +60,14 @@ from tests.ensemble.runs import shear_scene
 communicator = world()
 try:
     with abort_guard(communicator), store_on_ranks(communicator, Path(sys.argv[1])) as store:
-        stage = store.stage
+        stage = store.stage_recorded
 
-        def stage_late(run):
+        def stage_late(results, record):
             os.kill(os.getpid(), signal.SIGTERM)
             time.sleep(0.5)  # the order is sent
-            return stage(run)
+            return stage(results, record)
 
-        store.stage = stage_late
+        store.stage_recorded = stage_late
         run_batch(communicator, [shear_scene(1.0), shear_scene(2.0)], store, lambda _: None)
 except Interrupted as interrupted:
     sys.exit(interrupted.status)
