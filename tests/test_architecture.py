@@ -37,7 +37,7 @@ FORBIDDEN = {
 ORDER = {
     "solver": """
         compilation dimensions memory model parallel registry revision roots
-        flows pair_potentials
+        flows pair_potentials protocols
         scene
         membrane
         potentials

@@ -46,6 +46,7 @@ const ANGLE = { convert: degrees, ticks: angleTicks };
 
 /** Curves and panels for which a run has no series are omitted. @type {Panel[]} */
 const PANELS = [
+  { title: "rate of the flow", curves: [{ series: "flow_rate", name: "rate", color: "ink" }] },
   { title: "gap", curves: [{ series: "gap", name: "gap", color: "ink" }] },
   {
     title: "center angle (deg)",

@@ -90,7 +90,8 @@ export function describe(scene, without = []) {
     );
   const count = scene.vesicles.length;
   const vesicles = count === 1 ? "1 vesicle" : `${count} vesicles`;
-  return [`${vesicles} in ${flow?.title ?? "quiescent fluid"}`, ...shown].join(", ");
+  const changing = scene.protocol ? [`rate by a protocol (${scene.protocol.kind})`] : [];
+  return [`${vesicles} in ${flow?.title ?? "quiescent fluid"}`, ...changing, ...shown].join(", ");
 }
 
 /**

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection
 from pathlib import Path
 from subprocess import CalledProcessError
@@ -206,7 +207,8 @@ class Picture:
         self._inside.set_verts(list(ends[:, :, 0]))
         self._time.set_text(f"$t$ = {time:.1f}")
         if self._flow:
-            self._flow.show(centers.T)
+            protocol = self._scene.protocol
+            self._flow.show(centers.T, math.copysign(1.0, protocol.factor(time)) if protocol else 1.0)
         for cursor in self._cursors:
             cursor.set_xdata([time, time])
 
@@ -285,12 +287,12 @@ class _FlowArrows:
             label="imposed flow",
         )
 
-    def show(self, centers: Array) -> None:
-        """Show the flow for vesicles with these centers, (2, vesicles)."""
+    def show(self, centers: Array, sense: float) -> None:
+        """Show the flow for vesicles with these centers, (2, vesicles), or for -1 the reversed one."""
         middle = centers.mean(axis=1)[:, None, None]
         velocity = self._flow.velocity(middle + self._places, centers) - self._flow.velocity(middle, centers)
         fastest = np.hypot(*velocity).max() or 1.0  # a uniform flow has no relative velocity
-        self.arrows.set_UVC(*(velocity * (0.9 * self._spacing / fastest)))
+        self.arrows.set_UVC(*(velocity * (sense * 0.9 * self._spacing / fastest)))
 
 
 def _inner(limits: Array, spacing: float) -> Array:

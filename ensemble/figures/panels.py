@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MultipleLocator
 
 from ensemble.figures.style import BLACK, BLUE, GRAY, GREEN, VERMILLION
-from ensemble.figures.symbols import DISTANCE, with_unit
+from ensemble.figures.symbols import DISTANCE, axis_label, with_unit
 from solver.analysis.run import Run
 from solver.dimensions import ENERGY_PER_DEPTH, LENGTH
 
@@ -60,6 +60,11 @@ def _label_parts(axes: Axes) -> None:
     axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=3, borderaxespad=0.2, columnspacing=1.0)
 
 
+def _draw_rate(axes: Axes, run: Run) -> None:
+    axes.plot(run.series["time"], run.series["flow_rate"], color=BLACK)
+    axes.set_ylabel(axis_label("flow.rate", run.scene))
+
+
 def _draw_energy(axes: Axes, run: Run) -> None:
     _draw_parts(axes, run, "bending_energy", "bending", "adhesion_energy")
     axes.set_ylabel(with_unit("energy", ENERGY_PER_DEPTH, run.scene))
@@ -91,6 +96,7 @@ def _draw_clusters(axes: Axes, run: Run) -> None:
 
 # By the series that a run must have.
 PANELS: Final[dict[str, Callable[[Axes, Run], None]]] = {
+    "flow_rate": _draw_rate,
     "gap": _draw_gap,
     "center_angle": _draw_center_angle,
     "inclination_angle": _draw_inclination,

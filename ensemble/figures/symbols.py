@@ -151,6 +151,7 @@ def describe(scene: Scene, without: Collection[str] = ()) -> str:
     subject = [
         f"{count} vesicles" if count > 1 else "1 vesicle",
         f"in {scene.flow.title if scene.flow else 'quiescent fluid'}",
+        *([scene.protocol.title] if scene.protocol else []),
     ]
     parameters = [
         f"${quantity(path, scene.flow).symbol}$ = {_numbers(numbers)}{_in_units(path, numbers, scene)}"

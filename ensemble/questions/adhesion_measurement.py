@@ -64,6 +64,8 @@ class AdhesionMeasurement:
         flow = self.scene.imposed_flow
         if flow is None or not flow.strains or flow.comoving or len(self.scene.vesicles) != 2:
             raise ValueError("flow: a measurement takes a pair in a trap, at the critical rate")
+        if self.scene.protocol is not None:
+            raise ValueError("protocol: a measurement takes one rate, the critical one; leave it out")
         if self.adhesion.cutoff is not None:
             raise ValueError("adhesion.cutoff: a measurement takes a potential without it")
         parameter_value(self.scene, _AREA)

@@ -182,10 +182,11 @@ def settled_answer(scene: Scene, path: Path | None) -> Answer:
     Raises
     ------
     ValueError
-        If the pair has no symmetry that could be broken.
+        If the pair has no symmetry that could be broken, or a rate that changes with time.
     """
     from solver.simulation.broken_symmetry import require_image, symmetry_breaking
 
+    _require_one_rate(scene)
     require_image(scene)
     with opened(path) as store:
         run = run_of(scene, store)
@@ -202,7 +203,7 @@ def settled_answer(scene: Scene, path: Path | None) -> Answer:
 
 
 def revolves(scene: Scene) -> bool:
-    """Return whether the flow turns several vesicles round, so that they have no steady state.
+    """Return whether the flow always turns several vesicles round, so that they have no steady state.
 
     Parameters
     ----------
@@ -212,7 +213,13 @@ def revolves(scene: Scene) -> bool:
     -------
     bool
     """
-    return len(scene.vesicles) > 1 and scene.flow is not None and scene.flow.rotates
+    flow = scene.flow
+    return len(scene.vesicles) > 1 and flow is not None and flow.rotates and not flow.strains
+
+
+def _require_one_rate(scene: Scene) -> None:
+    if scene.protocol is not None:
+        raise ValueError("protocol: states and their stability are those at one rate; leave it out")
 
 
 def require_steady_states(scene: Scene) -> None:
@@ -225,8 +232,9 @@ def require_steady_states(scene: Scene) -> None:
     Raises
     ------
     ValueError
-        If it has too many vesicles, or a pair that revolves.
+        If it has too many vesicles, a pair that revolves, or a rate that changes with time.
     """
+    _require_one_rate(scene)
     count = len(scene.vesicles)
     if count > LARGEST_DENSE:
         raise ValueError(f"vesicles: steady states are computed of at most {LARGEST_DENSE}, got {count}")

@@ -64,6 +64,10 @@ class AnswerErrors(Remembering):
         self._separation: Array | None = None
         self.sensitive = False
 
+    def count_from_here(self) -> None:
+        """Forget the passages so far, as the tracker does."""
+        self._at_passages, self._samples = [], []
+
     def restore(self, saved: Saved) -> None:
         """Remember what another one did; see `Remembering`.
 

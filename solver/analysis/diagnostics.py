@@ -73,10 +73,10 @@ def viscosity_measures(scene: Scene, equation: EquationOfMotion) -> dict[str, Me
     dict
         As of `measures`; empty for flows without a viscosity.
     """
-    flow = scene.flow
-    if flow is None or not (shear_rate := flow.shear_rate):
+    shear_rate = scene.shear_rate
+    if scene.flow is None or not shear_rate:
         return {}
-    gradient = np.array(flow.velocity_gradient(np.zeros(2)) / shear_rate)
+    gradient = np.array(scene.flow.velocity_gradient(np.zeros(2)) / shear_rate)
     area = equation.membranes.multiplicity * _areas(scene.vesicles[: equation.membranes.count]).sum()
     scale = 1 / (shear_rate * area)
     parts: dict[str, Measure] = {

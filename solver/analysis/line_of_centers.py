@@ -64,6 +64,10 @@ class LineOfCenters(RevolutionTracker):
         self.distance = self.distance_of(state)
         self.separated_distance = max(separated_distance, _FARTHER * self.distance)
         self.separated = False
+
+    def count_from_here(self) -> None:
+        """Count passages, and take openings, from the end of the last step on."""
+        super().count_from_here()
         self.openings: list[float] = []
         self._opening = 0.0  # in the half turn that has not ended
 

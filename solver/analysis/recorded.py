@@ -42,6 +42,7 @@ RECORDED: Final[Mapping[str, Recorded]] = {
     "area_error": Recorded("largest relative drift of a vesicle's area", NUMBER),
     "closure_error": Recorded("largest gap in a membrane over its length", NUMBER),
     "state_rate": Recorded("largest rate of change of a tangent angle or center", RATE),
+    "flow_rate": Recorded("rate of the flow", RATE),
     "gap": Recorded("smallest distance between two membranes", LENGTH),
     "center_distance": Recorded("distance of the two centers", LENGTH),
     "center_angle": Recorded("angle of the line of centers, unwrapped", ANGLE),

@@ -175,6 +175,8 @@ class Recorder(Remembering):
 
     def _record(self, time: float, state: Array, motion: Motion) -> None:
         sample = {"time": float(time)}
+        if self._scene.flow and self._scene.protocol:
+            sample["flow_rate"] = self._scene.flow.rate * self._scene.protocol.factor(time)
         sample |= {name: float(measure(motion)) for name, measure in self._measures.items()}
         if self._line_of_centers:
             sample["center_distance"] = self._line_of_centers.distance_of(state)

@@ -100,6 +100,10 @@ class RevolutionTracker(Remembering, ABC):
         self.membranes = membranes
         self._counted = counted
         self.angle = self._direction(state)
+        self.count_from_here()
+
+    def count_from_here(self) -> None:
+        """Count passages from the end of the last step on: what was before is no part of the motion now."""
         # A start in the counted direction is no passage, whatever its round-off.
         self._first = np.floor(self._half_turns(self.angle) + _ROUND_OFF) + 1
         self.passages: list[float] = []

@@ -152,13 +152,13 @@ class Work:
 
 
 # Diagnostics by name, each of shape (time,) and sampled at `Series["time"]`; `solver.analysis.recorded` says
-# what they measure and in which units.  Always present: time,
-# bending_energy, area_error, closure_error, state_rate.  With two or more vesicles: gap.  With exactly two:
+# what they measure and in which units.  Always present: time, bending_energy, area_error, closure_error,
+# state_rate.  With a protocol: flow_rate.  With two or more vesicles: gap.  With exactly two:
 # center_distance, center_angle (of the line of centers, radians, unwrapped).  With adhesion:
-# adhesion_energy.  In shear: viscosity_bending_tension and, with adhesion, viscosity_adhesion and, with a
-# contrast, viscosity_contrast.  With one vesicle: inclination_angle (radians).  With three or more vesicles
-# and adhesion: clusters (their number, single vesicles included) and largest_cluster (vesicles in it);
-# `contacts` says what a cluster is.
+# adhesion_energy.  In shear and linear flow: viscosity_bending_tension and, with adhesion,
+# viscosity_adhesion and, with a contrast, viscosity_contrast.  With one vesicle: inclination_angle (radians).
+# With three or more vesicles and adhesion: clusters (their number, single vesicles included) and
+# largest_cluster (vesicles in it); `contacts` says what a cluster is.
 Series = Mapping[str, Array]
 
 # What is measured of every vesicle where there are three or more, sampled at `Series["time"]`, by name:

@@ -194,8 +194,9 @@ class Membranes:
         (..., M, 2)
             A view.
         """
-        size = self.count * self.points
-        return state[..., size:].reshape(*state.shape[:-1], 2, self.count).swapaxes(-1, -2)
+        first = self.count * self.points
+        placed = state[..., first : first + 2 * self.count]  # a clock may follow
+        return placed.reshape(*state.shape[:-1], 2, self.count).swapaxes(-1, -2)
 
     def curve_tangent_angle(self, state: Array) -> Array:
         """Return the tangent angles of all curves.

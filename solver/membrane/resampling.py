@@ -50,6 +50,7 @@ def resampled_state(membranes: Membranes, state: Array, finer: Membranes) -> Arr
     Returns
     -------
     (finer.state_size,)
+        With the clock if the state has one.
     """
     angle = resampled_angle(membranes.tangent_angle(state), finer.points)
-    return finer.pack(angle, membranes.center(state))
+    return np.concatenate([finer.pack(angle, membranes.center(state)), state[membranes.state_size :]])

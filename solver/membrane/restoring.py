@@ -55,8 +55,7 @@ def shape_rates(vesicles: Sequence[Vesicle], scene: Scene) -> Array:
     """
     bending = np.array([v.bending_modulus * (2 * np.pi / v.length) ** 3 for v in vesicles])
     adhesion = scene.adhesion.hamaker if scene.adhesion else 0.0
-    flow = scene.flow.rate if scene.flow else 0.0
-    return bending + adhesion + flow
+    return bending + adhesion + scene.highest_rate
 
 
 @compiled

@@ -20,7 +20,7 @@ from solver.membrane.geometry import Geometry, Membranes
 from solver.membrane.products import sum_rows
 from solver.membrane.spectral import differentiation, highest_modes, integration
 from solver.membrane.tangential_velocity import tangential_speed_by_curvature, tangential_speed_weights
-from solver.motion.equation import Motion, conserved_quantities, restored_motion, saved_motion
+from solver.motion.equation import Motion, conserved_quantities, flow_rate, restored_motion, saved_motion
 from solver.motion.jacobian import DenseJacobian
 from solver.potentials.proximity import Closeness
 
@@ -37,8 +37,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-def _of_steps() -> deque[tuple[bytes, Motion]]:
-    """Return what keeps the last evaluations, each by the bytes of its state.
+def _of_steps() -> deque[tuple[bytes, float, Motion]]:
+    """Return what keeps the last evaluations, each by the bytes of its state and the rate of its flow.
 
     A step asks again for one that an iteration began with before it failed, and for one that it ended with
     before its error was probed.
@@ -57,7 +57,7 @@ class DenseEquation:
     adhesion : DirectAdhesion or None
         None for a scene without, and for a single vesicle.
     flow : ImposedFlow or None
-        None in a quiescent fluid.
+        None in a quiescent fluid.  Its rate may be changed between evaluations.
     inextensibility : Inextensibility
     layer : SingleLayer
     contrast : ViscosityContrast or None
@@ -79,7 +79,7 @@ class DenseEquation:
     evaluations: int = field(default=0, init=False)
     recordings: int = field(default=0, init=False)
     _inverse: TensionInverse | None = field(default=None, init=False)
-    _recent: deque[tuple[bytes, Motion]] = field(default_factory=_of_steps, init=False)
+    _recent: deque[tuple[bytes, float, Motion]] = field(default_factory=_of_steps, init=False)
     _assembled: tuple[Geometry, Closeness | None] | None = field(default=None, init=False)
 
     @property
@@ -165,7 +165,10 @@ class DenseEquation:
             "recordings": self.recordings,
             "tension_iterations": self.inextensibility.iterations,
             "inverse": tuple(self._inverse) if self._inverse else None,
-            "recent": [saved_motion(np.frombuffer(state), motion) for state, motion in self._recent],
+            "recent": [
+                saved_motion(np.frombuffer(state), motion) | {"flow_rate": rate}
+                for state, rate, motion in self._recent
+            ],
         }
 
     def restore(self, saved: Saved) -> None:
@@ -183,7 +186,7 @@ class DenseEquation:
         for each in saved["recent"]:
             geometry = Geometry(self.membranes, each["state"])
             motion = restored_motion(each, geometry, Closeness(geometry) if several else None)
-            self._recent.append((each["state"].tobytes(), motion))
+            self._recent.append((each["state"].tobytes(), each["flow_rate"], motion))
 
     def conserved(self, state: Array) -> Array:
         """Return quantities of order 1 that the exact motion keeps; see `EquationOfMotion`.
@@ -283,7 +286,7 @@ class DenseEquation:
         self.evaluations += 1
         state = state.copy()  # the integrator may go on in its own array, and the motion is kept
         motion, self._inverse = self._evaluate(state)
-        self._recent.append((state.tobytes(), motion))
+        self._recent.append((state.tobytes(), flow_rate(self.flow), motion))
         return motion
 
     def _evaluate(self, state: Array) -> tuple[Motion, TensionInverse]:
@@ -310,9 +313,9 @@ class DenseEquation:
         return motion, inverse
 
     def _known(self, state: Array) -> Motion | None:
-        """Return the motion in a state in which steps have evaluated it lately."""
-        wanted = state.tobytes()
-        return next((motion for known, motion in self._recent if known == wanted), None)
+        """Return the motion in a state in which steps have evaluated it lately, with the present flow."""
+        wanted = state.tobytes(), flow_rate(self.flow)
+        return next((motion for *known, motion in self._recent if tuple(known) == wanted), None)
 
     def _assemble(self, geometry: Geometry) -> Closeness | None:
         """Fill the matrices for a geometry, unless they are filled for it already."""

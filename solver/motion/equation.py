@@ -28,6 +28,7 @@ from solver.membrane.spectral import highest_modes
 from solver.membrane.tangential_velocity import add_tangential_motion
 
 if TYPE_CHECKING:
+    from solver.flows import ImposedFlow
     from solver.forces.bending import Bending
     from solver.membrane.geometry import Geometry, Membranes
     from solver.memory import Saved
@@ -121,6 +122,20 @@ def _write_rate(curvature: Array, rotation_rate: Array, velocity: Array, held: A
 _FIELDS = ("velocity", "rotation_rate", "tension", "bending", "adhesion", "restoring")
 
 
+def flow_rate(flow: ImposedFlow | None) -> float:
+    """Return the rate of a flow, 0 without one: two evaluations differ in nothing else but their states.
+
+    Parameters
+    ----------
+    flow : ImposedFlow or None
+
+    Returns
+    -------
+    float
+    """
+    return flow.rate if flow else 0.0
+
+
 def saved_motion(state: Array, motion: Motion) -> Saved:
     """Return a motion as plain values (`solver.memory`).
 
@@ -187,18 +202,19 @@ class AdhesionEnergy(Protocol):
 
 
 class EquationOfMotion(Protocol):
-    """How tangent angles and centers change; the two forms are `DenseEquation` and `SummedEquation`.
+    """How tangent angles and centers change.
 
-    Attributes
-    ----------
-    evaluations : int
-        How often velocity, tension and forces were computed for `rate` and `jacobian`.
-    recordings : int
-        How often they were computed for `motion`, because no step had done so.
+    The two forms are `DenseEquation` and `SummedEquation`; `TimedEquation` is either of them with a rate of
+    flow that changes with time.
     """
 
-    evaluations: int
-    recordings: int
+    @property
+    def evaluations(self) -> int:
+        """How often velocity, tension and forces were computed for `rate` and `jacobian`."""
+
+    @property
+    def recordings(self) -> int:
+        """How often they were computed for `motion`, because no step had done so."""
 
     @property
     def membranes(self) -> Membranes:

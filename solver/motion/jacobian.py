@@ -21,14 +21,11 @@ class Jacobian(Protocol):
     """The derivative J of a rate by the state, exact or close to it.
 
     Where several ranks share a run, all calls are collective.
-
-    Attributes
-    ----------
-    exact : bool
-        Whether errors of the state can be followed with it; too much is missing from an approximate one.
     """
 
-    exact: ClassVar[bool]
+    @property
+    def exact(self) -> bool:
+        """Whether errors of the state can be followed with it; an approximate one lacks too much."""
 
     def __matmul__(self, direction: Array) -> Array:
         """Return J times a direction.

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from solver.forces.summed_tension import Preconditioner, SummedInextensibility
 from solver.forces.tension import TensionInverse, TensionNotFoundError
 from solver.membrane.geometry import Geometry, Membranes
-from solver.motion.equation import Motion, conserved_quantities, restored_motion, saved_motion
+from solver.motion.equation import Motion, conserved_quantities, flow_rate, restored_motion, saved_motion
 from solver.motion.jacobian import BlockDiagonal
 from solver.potentials.neighbors import Neighbors
 
@@ -31,9 +31,10 @@ Array = NDArray[np.float64]
 
 
 class _Evaluation(NamedTuple):
-    """A state, the motion in it, and the preconditioner that served to find its tension."""
+    """A state, the rate of its flow, the motion, and the preconditioner that served to find its tension."""
 
     state: Array
+    flow_rate: float
     motion: Motion
     preconditioner: Preconditioner
 
@@ -101,7 +102,7 @@ class SummedEquation:
         -------
         Motion
         """
-        if self._last and np.array_equal(self._last.state, state):
+        if self._last and self._is_of(self._last, state):
             return self._last.motion
         self.recordings += 1
         return self._evaluate(state).motion
@@ -132,7 +133,7 @@ class SummedEquation:
         -------
         BlockDiagonal
         """
-        if self._last is None or not np.array_equal(self._last.state, state):
+        if self._last is None or not self._is_of(self._last, state):
             self.evaluations += 1
             self._last = self._evaluate(state)
         motion = self._last.motion
@@ -190,7 +191,7 @@ class SummedEquation:
             "evaluations": self.evaluations,
             "recordings": self.recordings,
             "tension_iterations": self.inextensibility.iterations,
-            "last": saved_motion(last.state, last.motion) if last else None,
+            "last": saved_motion(last.state, last.motion) | {"flow_rate": last.flow_rate} if last else None,
             "preconditioner": tuple(last.preconditioner) if last else None,
         }
 
@@ -208,7 +209,8 @@ class SummedEquation:
             geometry = Geometry(self.membranes, saved["last"]["state"])
             motion = restored_motion(saved["last"], geometry, Neighbors(geometry, self.reach))
             preconditioner = Preconditioner(*saved["preconditioner"])
-            self._last = _Evaluation(saved["last"]["state"], motion, preconditioner)
+            state, rate = saved["last"]["state"], saved["last"]["flow_rate"]
+            self._last = _Evaluation(state, rate, motion, preconditioner)
 
     def conserved(self, state: Array) -> Array:
         """Return quantities of order 1 that the exact motion keeps; see `EquationOfMotion`.
@@ -245,7 +247,11 @@ class SummedEquation:
         motion = Motion(
             geometry, neighbors, free.velocity, free.rotation_rate, free.tension, bending, adhesion, restoring
         )
-        return _Evaluation(state, motion, preconditioner)
+        return _Evaluation(state, flow_rate(self.flow), motion, preconditioner)
+
+    def _is_of(self, evaluation: _Evaluation, state: Array) -> bool:
+        """Return whether an evaluation was made in a state, with the present flow."""
+        return evaluation.flow_rate == flow_rate(self.flow) and np.array_equal(evaluation.state, state)
 
     def _precondition(
         self,
@@ -264,6 +270,7 @@ class SummedEquation:
         failed = np.zeros(len(mine))
         for k, vesicle in enumerate(mine):
             isolated = self.isolated(vesicle)
+            isolated.flow = self.flow
             state = np.concatenate([geometry.tangent_angle[vesicle], geometry.centers[:, vesicle]])
             its_geometry = Geometry(isolated.membranes, state)
             try:

@@ -22,6 +22,7 @@ from solver.membrane.symmetry import independent_vesicles
 from solver.motion.dense import DenseEquation
 from solver.motion.equation import EquationOfMotion, accuracy_of
 from solver.motion.summed import SummedEquation
+from solver.motion.timed import TimedEquation
 from solver.parallel import SERIAL, Parallel
 from solver.potentials.single_layer import SingleLayer
 from solver.potentials.summed_single_layer import SummedSingleLayer
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
 MOST_ACCURATE = 1e-9  # tolerance below which `accuracy_of` does not improve
 
 
-def equation_of_motion(scene: Scene, parallel: Parallel = SERIAL) -> EquationOfMotion:
+def equation_of_motion(scene: Scene, parallel: Parallel = SERIAL, time: float = 0.0) -> EquationOfMotion:
     """Make the equation of motion of a scene, in the form that serves it better.
 
     Parameters
@@ -42,12 +43,18 @@ def equation_of_motion(scene: Scene, parallel: Parallel = SERIAL) -> EquationOfM
         Its number of points is given.
     parallel : Parallel
         The ranks that compute the run together.
+    time : float
+        When the steps begin.
 
     Returns
     -------
     EquationOfMotion
+        Of states with a clock if the scene has a protocol (`solver.motion.timed`).
     """
-    return summed_equation(scene, parallel) if scene.many else dense_equation(scene, parallel)
+    equation = summed_equation(scene, parallel) if scene.many else dense_equation(scene, parallel)
+    if scene.protocol is None or scene.flow is None:
+        return equation
+    return TimedEquation(equation, scene.flow, scene.protocol, time)
 
 
 def dense_equation(scene: Scene, parallel: Parallel = SERIAL) -> DenseEquation:

@@ -6,6 +6,7 @@ viscosity 1; a length of 2π and a bending modulus of 1 are the defaults of a ve
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
@@ -14,6 +15,7 @@ from solver.dimensions import TIME, UNITS
 from solver.flows import Flow, ImposedFlow
 from solver.model import Model, Positive
 from solver.pair_potentials import Adhesion
+from solver.protocols import Constant, FlowProtocol
 from solver.scene.arrangement import Arrangement
 from solver.scene.criteria import Criteria
 from solver.scene.ellipses import overlapping_pair
@@ -48,6 +50,8 @@ class Scene(Model):
         None if nothing adheres.
     flow : ImposedFlow or None
         None if the fluid is quiescent.
+    protocol : RateProtocol or None
+        How the rate of the flow changes with time; None if it does not.
     start : Start
         How a run begins.
     numerics : Numerics
@@ -64,6 +68,8 @@ class Scene(Model):
     vesicles: tuple[Vesicle, ...] = Field((), validate_default=True)
     adhesion: Adhesion | None = None
     flow: Flow | None = None
+    # Left out where there is none, so that keys of scenes are what they were before there were protocols.
+    protocol: FlowProtocol | None = Field(None, exclude_if=lambda protocol: protocol is None)
     start: Start = Start()
     numerics: Numerics = Numerics()
     criteria: Criteria = Criteria()
@@ -127,10 +133,46 @@ class Scene(Model):
                 )
         return self
 
+    @model_validator(mode="after")
+    def _of_a_flow(self) -> Self:
+        if self.protocol is not None and self.flow is None:
+            raise ValueError("protocol: there is no flow whose rate could change")
+        if isinstance(self.protocol, Constant):
+            object.__setattr__(self, "protocol", None)  # equal scenes are equal
+        return self
+
+    @property
+    def constant_from(self) -> float:
+        """When the rate of the flow changes for the last time: 0 without a protocol, or infinite."""
+        if self.protocol is None:
+            return 0.0
+        return math.inf if self.protocol.lasting is None else max(0.0, *self.protocol.breaks, 0.0)
+
+    @property
+    def highest_rate(self) -> float:
+        """The largest rate that the flow has, 0 without one."""
+        if self.flow is None:
+            return 0.0
+        return self.flow.rate * self.protocol.largest if self.protocol else self.flow.rate
+
+    @property
+    def shear_rate(self) -> float | None:
+        """That of the flow; None for flows that have none, and where the rate changes with time."""
+        return self.flow.shear_rate if self.flow and self.protocol is None else None
+
+    @property
+    def settled(self) -> Scene:
+        """The scene as it is once the rate of the flow does not change any more; otherwise itself."""
+        if self.flow is None or self.protocol is None or self.protocol.lasting is None:
+            return self
+        flow = self.flow.model_copy(update={"rate": self.flow.rate * self.protocol.lasting})
+        return self.model_copy(update={"flow": flow, "protocol": None})
+
     @property
     def imposed_flow(self) -> ImposedFlow | None:
-        """The flow, None in a quiescent fluid: one without, or with a flow of rate 0."""
-        return self.flow if self.flow and self.flow.rate > 0 else None
+        """The flow in the end, None in a quiescent fluid: one without, or with a flow of rate 0."""
+        flow = self.settled.flow
+        return flow if flow and flow.rate > 0 else None
 
     @model_validator(mode="after")
     def _options_of_many(self) -> Self:

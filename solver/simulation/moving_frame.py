@@ -5,7 +5,8 @@ run computes them in a frame about that mean, where they stay near the origin, a
 
     X' = A X + v,    X(t) = exp(At) X(0) + ∫₀ᵗ exp(A(t − s)) v(s) ds,
 
-with the velocity v of the mean in the frame (README, S11a).  Without the frame a pair near a stagnation point
+with the velocity v of the mean in the frame (README, S11a).  Where the rate changes with time, A t is the
+integral of A over time.  Without the frame a pair near a stagnation point
 loses its digits exponentially: in extension at the rate ε its distance from there grows like exp(εt), and so
 does every error of its place.
 """
@@ -53,6 +54,7 @@ class MovingFrame(Remembering):
 
     def __init__(self, flow: ImposedFlow, scene: Scene, start: Array) -> None:
         self.scene = scene
+        self._protocol = scene.protocol
         self._gradient = np.array(flow.velocity_gradient(np.zeros((2, 1)))[:, :, 0])
         self._mean = start  # where the last step began
         self._reached = start, start  # the mean and the origin where it ended
@@ -130,18 +132,27 @@ class MovingFrame(Remembering):
         if step is None:
             return self._reached
         elapsed = time - step.start
-        mean = expm(self._gradient * elapsed) @ self._mean
+        whole = expm(self._gradient * self._at_full_rate(time, elapsed))
+        mean = whole @ self._mean
         if self._membranes and self._membranes.multiplicity == 1:
             # By parts, with the mean c of the centers in the frame, ∫ exp(A(t − s)) c' ds.
             begin, end = self._within(step.start), self._within(time)
-            mean += end - expm(self._gradient * elapsed) @ begin
+            mean += end - whole @ begin
             for node, weight in zip(_NODES, _WEIGHTS, strict=True):
                 left = 0.5 * elapsed * (1 - node)
-                moved = expm(self._gradient * left) @ self._gradient @ self._within(time - left)
-                mean += 0.5 * elapsed * weight * moved
+                carried = expm(self._gradient * self._at_full_rate(time, left))
+                moved = carried @ self._gradient @ self._within(time - left)
+                factor = self._protocol.factor(time - left) if self._protocol else 1.0
+                mean += 0.5 * elapsed * weight * factor * moved
         else:
             end = np.zeros(2)
         return mean, mean - end
+
+    def _at_full_rate(self, time: float, before: float) -> float:
+        """Return how long the flow at its full rate takes for what it does in some time up to a time."""
+        if self._protocol is None:
+            return before
+        return self._protocol.integral(time) - self._protocol.integral(time - before)
 
     def _within(self, time: float) -> Array:
         """Return the mean of the centers in the frame."""

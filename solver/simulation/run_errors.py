@@ -41,7 +41,7 @@ def errors_of(scene: Scene, loop: TimeLoop, outcome: Outcome) -> Errors:
         of_answers["global_"] = float(np.hypot(temporal, recorder.spatial_position_error))
         of_answers["inclination_angle"] = _inclination_error(scene, loop, loop.error)
         of_answers["viscosity"] = _viscosity_error(scene, loop, loop.error, outcome)
-        if scene.flow and scene.flow.rotates:
+        if scene.flow and scene.flow.rotates and loop.time > scene.constant_from:
             of_answers["period"] = loop.answer_errors.period
         of_answers["time"] = loop.answer_errors.separation
     return Errors(

@@ -37,7 +37,8 @@ def results_of(
     outcome = loop.outcome if failure is None else Outcome.FAILED
     sample = loop.recorder.sample
     flow = scene.imposed_flow
-    rotates = flow is not None and flow.rotates
+    # Under a rate that changes no turn is like the one before.
+    rotates = flow is not None and flow.rotates and loop.time > scene.constant_from
     period = loop.tracker.period if loop.tracker and rotates else None
     done = loop.segment.work
     return RunResults(

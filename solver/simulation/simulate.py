@@ -332,7 +332,7 @@ class Simulation:
         scene = self._scene
         # A circle has no other shape near: there is nothing to examine.
         has_circle = any(vesicle.is_circle for vesicle in scene.vesicles)
-        examine = None if scene.many or has_circle else partial(_examined, self._within)
+        examine = None if scene.many or has_circle else partial(_examined, self._within.settled)
         return TimeLoop(placed, state, self._resolution, self._parallel, self._sink, self._frame, examine)
 
 
@@ -365,6 +365,7 @@ def _at_rest(scene: Scene) -> Scene:
     return scene.model_copy(
         update={
             "flow": None,
+            "protocol": None,
             "start": scene.start.model_copy(update={"relaxed": False}),
             "horizon": scene.start.horizon,
             "output": scene.output.model_copy(update=_RELAXATION_OUTPUT),

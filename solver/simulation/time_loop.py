@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,6 +24,7 @@ from solver.integrators import Step, StepFailedError
 from solver.membrane.resampling import resampled_state
 from solver.memory import Remembering, Saved
 from solver.motion.terms import equation_of_motion
+from solver.motion.timed import with_clock
 from solver.parallel import require_agreement
 from solver.simulation.resolution import Resolution, with_points
 from solver.simulation.segment import Segment, SegmentWork
@@ -64,11 +64,11 @@ class TimeLoop(Remembering):
     ----------
     time : float
     state : (state_size,)
-        At this time.
+        At this time; with a clock if the scene has a protocol (`solver.motion.timed`).
     outcome : Outcome
         `UNDECIDED` as long as the run goes on.
     segment : Segment
-        The part of the run that has the present number of points.
+        The part of the run that has the present number of points, up to the next break of the protocol.
     tracker : RevolutionTracker or None
         Of the line of centers of a pair, or of the long axis of a single vesicle that may tumble.
     recorder : Recorder
@@ -121,9 +121,9 @@ class TimeLoop(Remembering):
         self._examine = examine
         self._criteria = criteria_for(scene)
         self.time = 0.0
-        self.state = state
+        self.state = self._clocked(state)
         self.outcome = Outcome.UNDECIDED
-        self.segment = Segment(equation_of_motion(scene, parallel=parallel), scene, SegmentWork())
+        self.segment = Segment(equation_of_motion(scene, parallel, self.time), scene, SegmentWork())
         membranes = self.segment.membranes
         counted = counted_direction(scene.flow)
         self._line_of_centers = (
@@ -136,8 +136,7 @@ class TimeLoop(Remembering):
         self.recorder = Recorder(
             scene, self.segment.equation, self._line_of_centers, sink, frame.origin if frame else None
         )
-        in_shear = scene.flow is not None and scene.flow.shear_rate
-        self.viscosities = ViscosityHistory(scene, self.segment.equation) if in_shear else None
+        self.viscosities = ViscosityHistory(scene, self.segment.equation) if scene.shear_rate else None
         if self.viscosities and not self.tracker:
             self.viscosities.mark(scene.horizon / 2)
         self.steps = self.rejected_steps = 0
@@ -169,7 +168,8 @@ class TimeLoop(Remembering):
         ----------
         saved : dict
         """
-        self._take_segment(saved["segment"]["points"])
+        begun, *_ = saved["segment"]["begun"]
+        self._take_segment(saved["segment"]["points"], begun)
         super().restore(saved)
         self.outcome = Outcome(saved["outcome"])
         for criterion, its_memory in zip(self._criteria, saved["criteria"], strict=True):
@@ -190,7 +190,7 @@ class TimeLoop(Remembering):
         """Prepare the first step."""
         for criterion in self._criteria:
             criterion.begin(self._history)
-        self.segment.begin(self.time, self.state, self._scene.horizon, self.error)
+        self.segment.begin(self.time, self.state, self._latest, self.error)
 
     def advance(self) -> bool:
         """Take one step.
@@ -216,15 +216,41 @@ class TimeLoop(Remembering):
             self._refine(points)
             return False
         self._accept(step)
+        if self.time in self._breaks and not self.done:
+            self._pass_break()
         limit = self._scene.numerics.work_limit
         if self.segment.work.evaluations > limit:
             raise StepFailedError(f"the work limit of {limit} evaluations is reached")
         return True
 
+    @property
+    def _breaks(self) -> tuple[float, ...]:
+        """When the rate of the flow, or its slope, jumps: no step goes on beyond."""
+        return self._scene.protocol.breaks if self._scene.protocol else ()
+
+    @property
+    def _latest(self) -> float:
+        """When the present steps end at the latest."""
+        return min([each for each in self._breaks if each > self.time] + [self._scene.horizon])
+
+    def _clocked(self, state: Array) -> Array:
+        """Return a state with its time, if the motion depends on it."""
+        return with_clock(state, self.time) if self._scene.protocol else state
+
+    def _pass_break(self) -> None:
+        """Go on with another rate.  A motion can settle under one rate only."""
+        if self.tracker:
+            self.tracker.count_from_here()
+            self.answer_errors.count_from_here()
+        membranes = self.segment.membranes
+        self.state = self._clocked(self.state[: membranes.state_size])  # without the clock's round-off
+        self._take_segment(membranes.points, self.time)
+        self.begin()
+
     def _refine(self, points: int) -> None:
         """Go on from the start of the step with more points."""
         coarse = self.segment.membranes
-        self._take_segment(points)
+        self._take_segment(points, self.time)
         state = resampled_state(coarse, self.state, self.segment.membranes)
         if self.error is not None:
             columns = [
@@ -240,14 +266,14 @@ class TimeLoop(Remembering):
         """Go on from the state that a criterion wants, if one does."""
         for criterion in self._criteria:
             if criterion.departure is not None:
-                self.state, criterion.departure = criterion.departure, None
+                self.state, criterion.departure = self._clocked(criterion.departure), None
                 self.perturbations.append(float(self.time))
-                self._take_segment(self.segment.membranes.points)
+                self._take_segment(self.segment.membranes.points, self.time)
                 self.begin()
 
-    def _take_segment(self, points: int) -> None:
-        """Begin the part of the run that has this number of points."""
-        equation = equation_of_motion(with_points(self._scene, points), parallel=self._parallel)
+    def _take_segment(self, points: int, time: float) -> None:
+        """Begin the part of the run that has this number of points and begins at a time."""
+        equation = equation_of_motion(with_points(self._scene, points), self._parallel, time)
         self.segment = Segment(equation, self._scene, self.segment.work)
         self.recorder.continue_with(self.segment.equation)
         if self.viscosities:
@@ -256,8 +282,8 @@ class TimeLoop(Remembering):
             self.tracker.membranes = self.segment.membranes
 
     def _accept(self, step: Step) -> None:
-        # The last step is as long as what is left of the run.
-        if step.end < self._scene.horizon or self.smallest_step is None:
+        # The last step is as long as what is left of the run, or up to a break.
+        if step.end < self._latest or self.smallest_step is None:
             duration = float(step.end - step.start)
             self.smallest_step = min(self.smallest_step or duration, duration)
         if self.tracker:
@@ -286,6 +312,12 @@ class TimeLoop(Remembering):
         decisions = (criterion.decide(self._history) for criterion in self._criteria)
         return next((outcome for outcome in decisions if outcome), Outcome.UNDECIDED)
 
+    def _examined(self) -> Rest:
+        """Find out what is behind the present state."""
+        assert self._examine
+        membranes = self.segment.membranes
+        return self._examine(membranes, self.state[: membranes.state_size])
+
     @property
     def undecided(self) -> str | None:
         """Why the run is undecided, as far as its criteria say."""
@@ -303,5 +335,5 @@ class TimeLoop(Remembering):
             sample=self.recorder.sample,
             line_of_centers=self._line_of_centers,
             long_axis=self._long_axis,
-            examine=partial(self._examine, self.segment.membranes, self.state) if self._examine else None,
+            examine=self._examined if self._examine else None,
         )

@@ -10,6 +10,7 @@ import numpy as np
 
 from solver import Run, Simulation
 from solver.memory import Saved
+from solver.protocols import Ramp, Sine, Steps
 from solver.scene import Extension, Numerics, PowerLaw, Scene, Shear, Start, Trap, Vesicle
 from tests.solver.scenes import shear_pair, with_contrasts
 from tests.solver.suspensions import suspension
@@ -40,6 +41,9 @@ SCENES = {
     "relaxed": RELAXED,
     "moving frame": EXTENSION,
     "many": suspension(8, horizon=1.0),
+    "protocol": EXTENSION.model_copy(update={"protocol": Ramp(begin=0.5, duration=0.7, start=0.5)}),
+    "oscillating": PAIR.model_copy(update={"protocol": Sine(mean=1.0, period=2.0)}),
+    "many with steps": suspension(8, horizon=1.0, protocol=Steps(times=(0.4,), factors=(1.0, 2.0))),
     "at rest": PAIR.model_copy(update={"flow": None, "horizon": 300.0}),
     "single": ONE.model_copy(update={"numerics": numerics()}),
 }

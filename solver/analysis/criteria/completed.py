@@ -1,4 +1,4 @@
-"""A scene of many vesicles has been followed to its horizon."""
+"""A scene has been followed to its horizon, and that was all."""
 
 from __future__ import annotations
 
@@ -12,11 +12,15 @@ if TYPE_CHECKING:
 
 
 class Completed(Criterion):
-    """The horizon has come: of three vesicles or more nobody asks whether they stay together."""
+    """The horizon has come, and no motion can settle before.
+
+    Of three vesicles or more nobody asks whether they stay together.  In a flow whose rate changes up to the
+    horizon nothing comes to rest or repeats itself.
+    """
 
     @classmethod
     def applies_to(cls, scene: Scene) -> bool:
-        """Return whether the scene has three vesicles or more.
+        """Return whether the scene has three vesicles or more, or a rate that changes up to the horizon.
 
         Parameters
         ----------
@@ -26,7 +30,7 @@ class Completed(Criterion):
         -------
         bool
         """
-        return len(scene.vesicles) > 2
+        return len(scene.vesicles) > 2 or scene.constant_from >= scene.horizon
 
     def decide(self, history: History) -> Outcome | None:
         """Return `Outcome.COMPLETED` at the horizon.

@@ -56,7 +56,7 @@ class Revolved(Criterion):
         """
         line, criteria = history.line_of_centers, self._scene.criteria
         assert line
-        if line.half_turns == self._seen:
+        if history.time <= self._scene.constant_from or line.half_turns == self._seen:
             return None
         self._seen = line.half_turns
         bound = self._seen >= 2 * criteria.revolutions and line.has_settled(criteria.settled_change)

@@ -80,6 +80,8 @@ class Steady(Criterion):
         -------
         Outcome or None
         """
+        if history.time <= self._scene.constant_from:
+            return None
         if not self._at_rest(history):
             self._leaves = False
             return None

@@ -46,7 +46,7 @@ class Tumbled(Criterion):
         """
         axis, criteria = history.long_axis, self._scene.criteria
         assert axis
-        if axis.half_turns < 2 * criteria.revolutions:
+        if history.time <= self._scene.constant_from or axis.half_turns < 2 * criteria.revolutions:
             return None
         last = history.time >= self._scene.horizon
         return Outcome.TUMBLING if last or axis.has_settled(criteria.settled_change) else None

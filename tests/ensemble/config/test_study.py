@@ -35,7 +35,7 @@ PUBLISHED = (
     "vesicle-shear",
 )
 MANY = ("cluster-quiescent", "suspension-shear")
-SCENES = (*PUBLISHED, *MANY, "doublet-linear", "doublet-unequal")
+SCENES = (*PUBLISHED, *MANY, "doublet-linear", "doublet-ramp", "doublet-unequal")
 
 HAMAKER = load_study("critical-hamaker")
 

@@ -1,0 +1,49 @@
+"""A rate that rises or falls evenly."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Literal
+
+from solver.dimensions import TIME
+from solver.model import NonNegative, Positive
+from solver.protocols.rate_protocol import Piece, RateProtocol
+
+
+class Ramp(RateProtocol):
+    """The rate changes evenly from one multiple of the flow's rate to another one, and stays there.
+
+    Attributes
+    ----------
+    start, end : float
+        Multiples of the flow's rate before and after.
+    begin : float
+        When it begins to change.
+    duration : float
+        For how long it changes.
+    """
+
+    kind: Literal["ramp"] = "ramp"
+    start: NonNegative = 0.0
+    end: NonNegative = 1.0
+    begin: Annotated[NonNegative, TIME] = 0.0
+    duration: Annotated[Positive, TIME]
+
+    title: ClassVar[str] = "with a ramp of the rate"
+
+    @property
+    def pieces(self) -> tuple[Piece, ...]:
+        """Before, during and after the change."""
+        slope = (self.end - self.start) / self.duration
+        before = (Piece.line(0.0, self.start),) if self.begin > 0 else ()
+        changing = Piece.line(self.begin, self.start, slope)
+        return (*before, changing, Piece.line(self.begin + self.duration, self.end))
+
+    @property
+    def largest(self) -> float:
+        """The larger one of start and end."""
+        return max(self.start, self.end)
+
+    @property
+    def lasting(self) -> float:
+        """The end."""
+        return self.end

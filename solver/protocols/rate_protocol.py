@@ -1,0 +1,133 @@
+"""What every protocol states about itself.
+
+A protocol is a factor of the flow's rate that is smooth but for a few times.  Steps end there.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from bisect import bisect_right
+from collections.abc import Callable
+from itertools import pairwise
+from typing import ClassVar, NamedTuple, Self
+
+from solver.model import Model
+
+
+class Piece(NamedTuple):
+    """A smooth part of a protocol; its functions take times, beyond its end as well.
+
+    Attributes
+    ----------
+    start : float
+        When it begins; it ends where the next one begins.
+    factor, slope : callable
+        The factor, and its derivative by time.
+    integral : callable
+        Of the factor since the start, in units of time.
+    """
+
+    start: float
+    factor: Callable[[float], float]
+    slope: Callable[[float], float]
+    integral: Callable[[float], float]
+
+    @classmethod
+    def line(cls, start: float, factor: float, slope: float = 0.0) -> Self:
+        """Return a piece in which the factor changes at the same speed all the time.
+
+        Parameters
+        ----------
+        start : float
+        factor : float
+            At the start.
+        slope : float
+
+        Returns
+        -------
+        Piece
+        """
+        return cls(
+            start,
+            lambda time: factor + slope * (time - start),
+            lambda time: slope,
+            lambda time: (time - start) * (factor + 0.5 * slope * (time - start)),
+        )
+
+
+class RateProtocol(Model, ABC):
+    """A factor of the flow's rate that depends on time.
+
+    Attributes
+    ----------
+    kind : str
+        Tells the registered protocols apart; a literal with itself as the default.
+    title : str
+        The protocol in the words of a caption: "shear flow, …".
+    """
+
+    kind: str
+
+    title: ClassVar[str]
+
+    @property
+    @abstractmethod
+    def pieces(self) -> tuple[Piece, ...]:
+        """The smooth parts in their order, the first one from time 0 on."""
+
+    @property
+    @abstractmethod
+    def largest(self) -> float:
+        """The largest magnitude of the factor."""
+
+    @property
+    @abstractmethod
+    def lasting(self) -> float | None:
+        """The factor in the last piece if it is constant there; None if it never becomes constant."""
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """The times at which the factor or its slope jumps."""
+        return tuple(piece.start for piece in self.pieces[1:])
+
+    def piece_at(self, time: float) -> int:
+        """Return the index of the piece in which a time is, at a break that of the one that begins.
+
+        Parameters
+        ----------
+        time : float
+
+        Returns
+        -------
+        int
+        """
+        return bisect_right(self.breaks, time)
+
+    def factor(self, time: float) -> float:
+        """Return the factor at a time, at a break that from then on.
+
+        Parameters
+        ----------
+        time : float
+
+        Returns
+        -------
+        float
+        """
+        return self.pieces[self.piece_at(time)].factor(time)
+
+    def integral(self, time: float) -> float:
+        """Return the integral of the factor from 0 to a time.
+
+        Parameters
+        ----------
+        time : float
+
+        Returns
+        -------
+        float
+            In units of time.
+        """
+        begun = self.pieces[: self.piece_at(time) + 1]
+        whole = sum(piece.integral(following.start) for piece, following in pairwise(begun))
+        return whole + begun[-1].integral(time)

@@ -1,0 +1,60 @@
+"""A rate that oscillates."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, ClassVar, Literal
+
+from solver.dimensions import ANGLE, TIME
+from solver.model import Positive
+from solver.protocols.rate_protocol import Piece, RateProtocol
+
+
+class Sine(RateProtocol):
+    """The rate is that of the flow times mean + amplitude·sin(2π·time/period + phase), for ever.
+
+    It may change its sign: then the flow is reversed.
+
+    Attributes
+    ----------
+    mean, amplitude : float
+        Multiples of the flow's rate.
+    period : float
+        Of the oscillation.
+    phase : float
+        Radians.
+    """
+
+    kind: Literal["sine"] = "sine"
+    mean: float = 0.0
+    amplitude: Positive = 1.0
+    period: Annotated[Positive, TIME]
+    phase: Annotated[float, ANGLE] = 0.0
+
+    title: ClassVar[str] = "with an oscillating rate"
+
+    @property
+    def pieces(self) -> tuple[Piece, ...]:
+        """A single one."""
+        mean, amplitude, phase, frequency = self.mean, self.amplitude, self.phase, 2 * math.pi / self.period
+        return (
+            Piece(
+                0.0,
+                lambda time: mean + amplitude * math.sin(frequency * time + phase),
+                lambda time: amplitude * frequency * math.cos(frequency * time + phase),
+                lambda time: (
+                    mean * time
+                    + amplitude / frequency * (math.cos(phase) - math.cos(frequency * time + phase))
+                ),
+            ),
+        )
+
+    @property
+    def largest(self) -> float:
+        """Mean and amplitude together."""
+        return abs(self.mean) + self.amplitude
+
+    @property
+    def lasting(self) -> None:
+        """None: it goes on changing."""
+        return
