@@ -93,7 +93,7 @@ def show(  # numpydoc ignore=PR01
         str,
         typer.Argument(
             metavar="RUN|BOUNDARY|BRANCH",
-            help="Key of one of these or its beginning, or a boundary's name.",
+            help="Key of one of these or its beginning, or a boundary's name; also of a run that goes on.",
         ),
     ],
     output: Annotated[
@@ -145,11 +145,13 @@ def check(  # numpydoc ignore=PR01
 ) -> None:
     """Verify every run, boundary and branch of a store; the exit status is 1 if anything is wrong.
 
-    A check that was interrupted goes on where it was, within a day.
+    Runs that were interrupted and have a checkpoint are named, and are no problem.  A check that was
+    interrupted goes on where it was, within a day.
     """
     from rich.console import Console
 
     from ensemble.display.check_progress import check_lines, check_progress
+    from ensemble.store.unfinished import interrupted_runs
 
     at_once = processes or len(os.sched_getaffinity(0))
     display = check_lines if progress is ProgressFormat.JSON else check_progress
@@ -157,10 +159,11 @@ def check(  # numpydoc ignore=PR01
         done = _repaired(store, on_progress, at_once) if repair else []
         with _existing(store) as opened:
             problems = opened.check(on_progress, at_once)
+            interrupted = list(interrupted_runs(opened.path))
     if as_json:
-        print_json({"store": str(store), "done": done, "problems": problems})
+        print_json({"store": str(store), "done": done, "problems": problems, "interrupted": interrupted})
     else:
-        print("\n".join([*done, *problems]) or f"{store} is whole")
+        print("\n".join([*([*done, *problems] or [f"{store} is whole"]), *interrupted]))
     raise typer.Exit(1 if problems else 0)
 
 

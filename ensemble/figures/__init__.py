@@ -6,5 +6,6 @@ Figures are built from matplotlib's objects without pyplot, so they need no disp
 from ensemble.figures.diagram import phase_diagram
 from ensemble.figures.figure_files import save
 from ensemble.figures.history import run_figure
+from ensemble.figures.run_drawing import draw_run
 
-__all__ = ["phase_diagram", "run_figure", "save"]
+__all__ = ["draw_run", "phase_diagram", "run_figure", "save"]

@@ -177,14 +177,17 @@ class SceneQuestion(Question[Scene]):
         Returns
         -------
         StoredAnswer or None
-            The run.
+            The run; as far as it has come, if it is not done.
         """
         from ensemble.errors import NotStored
+        from ensemble.questions.unfinished_answer import UnfinishedAnswer
+        from ensemble.store.unfinished import unfinished_run
 
         try:
             return _StoredRun(store.summary(store.full_key(name)), store)
         except NotStored:
-            return None
+            unfinished = unfinished_run(store.path, name)
+            return UnfinishedAnswer(unfinished) if unfinished else None
 
     @classmethod
     def all_stored(cls, store: Store, listing: Listing, columns: Sequence[str]) -> StoredAnswers:
@@ -307,13 +310,6 @@ class _StoredRun(StoredAnswer):
 
     def draw(self, output: Path) -> None:
         """Draw what happened in the run, or its movie."""
-        from ensemble.figures import run_figure, save
-        from ensemble.figures.figure_files import FIGURE_SUFFIXES, suffix_among
-        from ensemble.figures.movie import MOVIE_SUFFIXES, save_movie
+        from ensemble.figures import draw_run
 
-        suffix = suffix_among(output, (*FIGURE_SUFFIXES, *MOVIE_SUFFIXES))
-        run = replace(self.store.load(self.summary.key), scene=self.summary.scene)
-        if suffix in MOVIE_SUFFIXES:
-            save_movie(run, output)
-        else:
-            save(run_figure(run), output)
+        draw_run(replace(self.store.load(self.summary.key), scene=self.summary.scene), output)

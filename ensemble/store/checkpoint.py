@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 from ensemble.config.run_key import run_key
 from ensemble.disk import flush
 from ensemble.errors import StoreError
-from ensemble.store.writers import STAGING, is_own_directory, lives
+from ensemble.store.writers import STAGING, is_own_directory, is_own_name, lives
 from solver.revision import RESULTS_REVISION
 
 if TYPE_CHECKING:
@@ -220,7 +220,8 @@ def checkpointed_keys(store: Path) -> Iterator[str]:
         Key of a run.
     """
     for path in (store / CHECKPOINTS).glob(f"*{SUFFIX}"):
-        yield path.stem
+        if is_own_name(path.stem):
+            yield path.stem
 
 
 def unfinished_keys(store: Path) -> set[str]:

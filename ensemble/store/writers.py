@@ -29,7 +29,21 @@ def is_own_directory(path: Path) -> bool:
     -------
     bool
     """
-    return bool(_NAME.fullmatch(path.name)) and path.is_dir() and not path.is_symlink()
+    return is_own_name(path.name) and path.is_dir() and not path.is_symlink()
+
+
+def is_own_name(name: str) -> bool:
+    """Tell whether a name is of the form that the store gives: 32 hexadecimal digits.
+
+    Parameters
+    ----------
+    name : str
+
+    Returns
+    -------
+    bool
+    """
+    return _NAME.fullmatch(name) is not None
 
 
 def abandoned(staging: Path) -> Iterator[Path]:

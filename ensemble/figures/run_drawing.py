@@ -1,0 +1,31 @@
+"""A run as a file: its figure or its movie."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ensemble.figures.figure_files import FIGURE_SUFFIXES, save, suffix_among
+from ensemble.figures.history import run_figure
+from solver.analysis.run import Run
+
+
+def draw_run(run: Run, output: Path) -> None:
+    """Draw what happened in a run, or its movie.
+
+    Parameters
+    ----------
+    run : Run
+    output : Path
+        Its suffix names the format.
+
+    Raises
+    ------
+    ValueError
+        If there is no such format.
+    """
+    from ensemble.figures.movie import MOVIE_SUFFIXES, save_movie
+
+    if suffix_among(output, (*FIGURE_SUFFIXES, *MOVIE_SUFFIXES)) in MOVIE_SUFFIXES:
+        save_movie(run, output)
+    else:
+        save(run_figure(run), output)

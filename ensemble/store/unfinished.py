@@ -1,0 +1,205 @@
+"""Runs that are not done, as their checkpoints and what they have recorded show them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+from pydantic import ValidationError
+
+from ensemble.errors import StoreError, StoreInputError
+from ensemble.store.checkpoint import CHECKPOINTS, checkpoint_path, checkpointed_keys
+from ensemble.store.writers import STAGING, lives
+from solver.scene import Scene
+
+if TYPE_CHECKING:
+    from solver.analysis.run import Run
+    from solver.memory import Saved
+
+
+@dataclass(frozen=True)
+class UnfinishedRun:
+    """A run that has a checkpoint, as it was then.
+
+    Attributes
+    ----------
+    key : str
+    scene : Scene
+    written : datetime
+        When the checkpoint was written.
+    in_progress : bool
+        Whether the process that wrote it lives.
+    saved : dict
+        What `solver.Simulation.saved` returned.
+    place : Path
+        Of what that process has recorded of the run.
+    counts : dict of str to int
+        How many blocks the checkpoint counts of each part of the record.
+    """
+
+    key: str
+    scene: Scene
+    written: datetime
+    in_progress: bool
+    saved: Saved
+    place: Path
+    counts: dict[str, int]
+
+    @classmethod
+    def read(cls, store: Path, key: str) -> Self:
+        """Read the checkpoint of a run.
+
+        Parameters
+        ----------
+        store : Path
+            Directory of the store.
+        key : str
+            Of the run.
+
+        Returns
+        -------
+        UnfinishedRun
+
+        Raises
+        ------
+        StoreError
+            If there is none that can be read.
+        """
+        from ensemble.store.plain_hdf5 import UnreadableFileError, read_plain
+
+        path = checkpoint_path(store, key)
+        try:
+            content = read_plain(path)
+            record = content["record"]
+            return cls(
+                key=key,
+                scene=Scene.model_validate_json(content["scene"]),
+                written=datetime.fromtimestamp(path.stat().st_mtime, UTC),
+                in_progress=lives(store / STAGING / record["writer"]),
+                saved=content["simulation"],
+                place=store / CHECKPOINTS / key / record["writer"],
+                counts=record["counts"],
+            )
+        except (OSError, UnreadableFileError, LookupError, TypeError, ValidationError) as error:
+            raise StoreError(f"run {key}: its checkpoint cannot be read ({error})") from error
+
+    @property
+    def time(self) -> float | None:
+        """The time that it has reached; None while its start relaxes."""
+        from solver.simulation.run_so_far import time_so_far
+
+        return time_so_far(self.saved)
+
+    @property
+    def progress(self) -> str:
+        """How far it has come, in words."""
+        time = self.time
+        if time is None:
+            return "while its start relaxes"
+        return f"at time {time:.6g} of {self.scene.horizon:g} at the latest"
+
+    def run(self) -> Run | None:
+        """Return what has been computed and recorded.
+
+        Returns
+        -------
+        Run or None
+            Undecided, without answers.  None while the start relaxes.
+
+        Raises
+        ------
+        StoreError
+            If what was recorded cannot be read, which happens while a run is being finished.
+        """
+        from ensemble.store.recorded_blocks import read_block
+        from solver.analysis.record import InMemory
+        from solver.simulation.run_so_far import run_so_far
+
+        memory = InMemory()
+        for part, count in self.counts.items():
+            for number in range(count):
+                memory.take(part, read_block(self.place, part, number))
+        return run_so_far(self.scene, self.saved, memory)
+
+    def json_document(self) -> dict[str, Any]:
+        """Return how far the run has come, its last diagnostics, and its scene.
+
+        Returns
+        -------
+        dict
+            JSON data.
+        """
+        run = self.run()
+        series = run.series if run else {}
+        return {
+            "run_key": self.key,
+            "status": "in progress" if self.in_progress else "interrupted",
+            "written": self.written.isoformat(timespec="seconds"),
+            "time": self.time,
+            "horizon": self.scene.horizon,
+            "steps": run.work.steps if run else None,
+            "wall_seconds": self.saved["wall_seconds"],
+            "samples": len(series["time"]) if run else 0,
+            "frames": len(run.frames.time) if run else 0,
+            "last": {name: float(values[-1]) for name, values in series.items()},
+            "scene": self.scene.model_dump(mode="json", exclude_none=True),
+        }
+
+
+def unfinished_run(store: Path, beginning: str) -> UnfinishedRun | None:
+    """Read the checkpoint of the only run whose key begins so.
+
+    Parameters
+    ----------
+    store : Path
+        Directory of the store.
+    beginning : str
+        The first characters of the key, or all of it.
+
+    Returns
+    -------
+    UnfinishedRun or None
+        None if there is no such run.
+
+    Raises
+    ------
+    StoreInputError
+        If there are several.
+    StoreError
+        If the checkpoint cannot be read.
+    """
+    keys = sorted(key for key in checkpointed_keys(store) if beginning and key.startswith(beginning))
+    if len(keys) > 1:
+        raise StoreInputError(f"run: {beginning} is the beginning of several keys: {', '.join(keys[:5])}")
+    return UnfinishedRun.read(store, keys[0]) if keys else None
+
+
+def interrupted_runs(store: Path) -> Iterator[str]:
+    """Name the runs that have a checkpoint, and that nobody goes on with at present.
+
+    Parameters
+    ----------
+    store : Path
+        Directory of the store.
+
+    Yields
+    ------
+    str
+        One sentence for each.
+    """
+    for key in sorted(checkpointed_keys(store)):
+        try:
+            unfinished = UnfinishedRun.read(store, key)
+        except StoreError as error:
+            if checkpoint_path(store, key).exists():  # else the run has just been finished
+                yield str(error)
+            continue
+        if not unfinished.in_progress:
+            written = f"{unfinished.written:%Y-%m-%d %H:%M} UTC"
+            yield (
+                f"run {key}: interrupted {unfinished.progress}, {written}; the next command that needs it "
+                "goes on from there"
+            )

@@ -1,0 +1,128 @@
+"""Runs that are not done are seen as far as they have come."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ensemble.errors import StoreError, StoreInputError
+from ensemble.questions import kinds
+from ensemble.store import RunStaging, Store
+from ensemble.store.checkpoint import CHECKPOINTS, checkpoint_path
+from ensemble.store.unfinished import UnfinishedRun, interrupted_runs, unfinished_run
+from solver import Outcome, Simulation, simulate
+from solver.scene import Output, Scene
+from tests.solver.restarts import PAIR, RELAXED, SCENES
+
+DENSE = Output(interval=0.01, frame_interval=0.02)
+
+
+@pytest.fixture
+def staging(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[RunStaging]:
+    monkeypatch.setattr("solver.analysis.record.BLOCK_BYTES", 1000)
+    Store.open(tmp_path / "store").close()
+    with RunStaging(tmp_path / "store") as opened:
+        yield opened
+
+
+def kept_after(staging: RunStaging, scene: Scene, steps: int) -> str:
+    """The key of a run that has a checkpoint after so many steps, and has gone on."""
+    checkpoint = staging.checkpoint(scene)
+    simulation = Simulation(scene, sink=checkpoint.record)
+    for _ in range(steps):
+        simulation.step()
+    checkpoint.write(simulation.saved())
+    for _ in range(5):
+        simulation.step()
+    return checkpoint.key
+
+
+@pytest.mark.parametrize("name", ["pair", "auto", "many", "moving frame"])
+def test_what_is_seen_is_the_beginning_of_the_run(staging: RunStaging, name: str) -> None:
+    scene = SCENES[name].model_copy(update={"output": DENSE})
+    whole = simulate(scene)
+    key = kept_after(staging, scene, whole.work.steps * 3 // 4)
+    seen = UnfinishedRun.read(staging.path, key)
+    assert seen.in_progress
+    assert seen.scene == scene
+    run = seen.run()
+    assert run is not None
+    assert 0 < run.time == seen.time < whole.time
+    assert run.outcome is Outcome.UNDECIDED
+    assert 0 < run.work.rhs_evaluations < whole.work.rhs_evaluations
+    samples, frames = len(run.series["time"]), len(run.frames.time)
+    assert 5 < samples < len(whole.series["time"])
+    for part, expected in ((run.series, whole.series), (run.vesicle_series, whole.vesicle_series)):
+        assert part.keys() == expected.keys()
+        for each, values in part.items():
+            np.testing.assert_array_equal(values, expected[each][:samples], err_msg=each)
+    np.testing.assert_array_equal(run.frames.center, whole.frames.center[:frames])
+    document = json.loads(json.dumps(seen.json_document()))
+    assert document["samples"] == samples
+    assert document["last"]["time"] == run.series["time"][-1]
+
+
+def test_a_start_that_relaxes_has_nothing_to_show(staging: RunStaging, tmp_path: Path) -> None:
+    key = kept_after(staging, RELAXED, 5)
+    with Store.existing(staging.path) as store:
+        (answer,) = (found for kind in kinds() if (found := kind.stored(store, key[:8])))
+    assert answer.json_document()["time"] is None
+    assert answer.json_document()["last"] == {}
+    with pytest.raises(ValueError, match="its start relaxes"):
+        answer.draw(tmp_path / "run.png")
+
+
+def test_its_figure_is_that_of_a_run(staging: RunStaging, tmp_path: Path) -> None:
+    key = kept_after(staging, PAIR, 20)
+    with Store.existing(staging.path) as store:
+        (answer,) = (found for kind in kinds() if (found := kind.stored(store, key)))
+    answer.draw(tmp_path / "run.svg")
+    assert "the run has not ended" in (tmp_path / "run.svg").read_text()
+
+
+def test_it_is_found_by_the_beginning_of_its_key(staging: RunStaging) -> None:
+    key = kept_after(staging, PAIR, 5)
+    found = unfinished_run(staging.path, key[:6])
+    assert found is not None
+    assert found.key == key
+    assert unfinished_run(staging.path, "") is None
+    assert unfinished_run(staging.path, "0" * 32) is None
+    twin = checkpoint_path(staging.path, key[:6] + "0" * 26)
+    twin.write_bytes(checkpoint_path(staging.path, key).read_bytes())
+    with pytest.raises(StoreInputError, match="several"):
+        unfinished_run(staging.path, key[:6])
+
+
+def test_those_that_nobody_goes_on_with_are_named(tmp_path: Path, staging: RunStaging) -> None:
+    with RunStaging(staging.path) as other:
+        key = kept_after(other, PAIR, 5)
+        assert list(interrupted_runs(staging.path)) == []
+    (line,) = interrupted_runs(staging.path)
+    assert line.startswith(f"run {key}: interrupted at time ")
+    (staging.path / CHECKPOINTS / "notes.h5").write_text("of somebody")
+    assert list(interrupted_runs(staging.path)) == [line]
+    checkpoint_path(staging.path, key).write_bytes(b"torn")
+    (line,) = interrupted_runs(staging.path)
+    assert line.startswith(f"run {key}: its checkpoint cannot be read")
+    with pytest.raises(StoreError, match="cannot be read"):
+        unfinished_run(staging.path, key)
+
+
+def test_commands_tell_of_it(ensemble, staging: RunStaging) -> None:
+    with RunStaging(staging.path) as other:
+        key = kept_after(other, PAIR, 20)
+        shown = ensemble("show", key[:8], f"--store={staging.path}", "--json")
+        assert shown.returncode == 0, shown.stderr
+        document = json.loads(shown.stdout)
+        assert document["run_key"] == key
+        assert document["status"] == "in progress"
+        assert 0 < document["time"] < PAIR.horizon == document["horizon"]
+    checked = ensemble("check", f"--store={staging.path}")
+    assert checked.returncode == 0
+    whole, line = checked.stdout.splitlines()
+    assert whole.endswith("is whole")
+    assert line.startswith(f"run {key}: interrupted at time ")
