@@ -27,6 +27,7 @@ from api.http.rate_limits import RateLimits
 from api.jobs.expected_times import ExpectedTimes
 from api.jobs.job_queue import Jobs
 from api.jobs.submissions import Submissions, job_limits
+from api.results.downloads import Downloads
 from api.routes.service import Service
 from api.settings import Settings
 from ensemble.config.documents import preset_names
@@ -102,6 +103,7 @@ def open_service(settings: Settings) -> Iterator[Service]:
             jobs=Jobs(database, store.path),
             submissions=Submissions(job_limits(settings)),
             expected_times=ExpectedTimes(store),
+            downloads=Downloads(store.path, settings.maximum_memory),
             # Kept for less time than a listener waits, so no listener receives an older state than before.
             watched_jobs=TTLCache(WATCHED_JOBS, ttl=settings.event_seconds / 2),
             tokens=tokens,

@@ -18,7 +18,9 @@ from api.results.boundary_values import (
     critical_value_at,
     fitted_boundary,
 )
+from api.results.downloads import MEDIA_TYPES, BoundaryFile, boundary_table, file_response
 from api.routes.service import Reader
+from api.routes.streaming import as_file, stream
 from ensemble.errors import BadInput
 from ensemble.store import Record
 
@@ -136,6 +138,46 @@ def get_critical_value(
         name: _number(name, text) for name, text in request.query_params.multi_items() if name != "method"
     }
     return critical_value_at(boundary, parameters, method)
+
+
+@router.get(
+    "/{key}/file", responses=NOT_MODIFIED | documented(HTTPStatus.NOT_FOUND) | file_response(BoundaryFile)
+)
+def get_boundary_file(
+    request: Request,
+    reader: Reader,
+    key: StudyKey,
+    format: Annotated[BoundaryFile, Query(description="Suffix of the file.")],
+) -> Response:
+    """Give a boundary as a file: its points as a table (CSV), or its phase diagram.
+
+    Parameters
+    ----------
+    request : Request
+    reader : Caller
+    key : str
+        Key of the study.
+    format : BoundaryFile
+
+    Returns
+    -------
+    Response
+
+    Raises
+    ------
+    NotStored
+        If there is no boundary of this key.
+    """
+    service = reader.service
+    boundary = service.store.boundary(key)
+
+    def make() -> Response:
+        if format is BoundaryFile.CSV:
+            return Response(boundary_table(boundary), media_type=MEDIA_TYPES[format])
+        return stream(reader, request, service.downloads.pieces(key, format), MEDIA_TYPES[format])
+
+    tag = etag(boundary.model_dump_json(), "file", format)
+    return as_file(cached_response(request, tag, REVALIDATE, make), f"boundary-{key[:8]}.{format}")
 
 
 def _number(name: str, text: str) -> float:

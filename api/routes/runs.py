@@ -11,10 +11,11 @@ from pydantic import StringConstraints
 from api.http.caching import IMMUTABLE, JSON, NOT_MODIFIED, cached_response, etag, json_response
 from api.http.paging import After, CollectionPage, Limit, Where, page_response
 from api.http.problems import documented
+from api.results.downloads import MEDIA_TYPES, RunFile, file_response
 from api.results.flow_field import FlowField, flow_field
 from api.results.run_arrays import FramesDocument, FrameSelection, SeriesDocument, SeriesSelection, centers
 from api.routes.service import Reader
-from api.routes.streaming import stream
+from api.routes.streaming import as_file, stream
 from ensemble.store.run_record import RunSummary
 
 BINARY = "application/octet-stream"
@@ -210,3 +211,40 @@ def get_flow(request: Request, reader: Reader, key: RunKey) -> Response:
         return json_response("null" if field is None else field)
 
     return cached_response(request, etag(key, "flow"), IMMUTABLE, make)
+
+
+@router.get("/{key}/file", responses=RUN_RESPONSES | file_response(RunFile))
+def get_file(
+    request: Request,
+    reader: Reader,
+    key: RunKey,
+    format: Annotated[RunFile, Query(description="Suffix of the file.")],
+) -> Response:
+    """Give a run as a file: all of it (HDF5), a movie, or a figure.
+
+    Parameters
+    ----------
+    request : Request
+    reader : Caller
+    key : str
+    format : RunFile
+
+    Returns
+    -------
+    Response
+
+    Raises
+    ------
+    NotStored
+        If there is no run of this key.
+    BadInput
+        If the run cannot be drawn so.
+    """
+    service = reader.service
+    service.store.run_record(key)
+
+    def make() -> Response:
+        pieces = service.downloads.pieces(key, format)
+        return as_file(stream(reader, request, pieces, MEDIA_TYPES[format]), f"run-{key[:8]}.{format}")
+
+    return cached_response(request, etag(key, "file", format), IMMUTABLE, make)

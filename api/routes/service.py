@@ -19,6 +19,7 @@ from api.http.rate_limits import RateLimits
 from api.jobs.expected_times import ExpectedTimes
 from api.jobs.job_queue import Jobs
 from api.jobs.submissions import Submissions
+from api.results.downloads import Downloads
 from api.settings import Settings
 from ensemble.store import Record, Store
 
@@ -38,6 +39,8 @@ class Service:
         Checks submitted documents.
     expected_times : ExpectedTimes
         How long jobs are likely to take.
+    downloads : Downloads
+        Makes files of runs and boundaries.
     watched_jobs : TTLCache
         Recently read jobs by their identifiers, shared by all clients that listen to events.
     tokens : Tokens
@@ -55,6 +58,7 @@ class Service:
     jobs: Jobs
     submissions: Submissions
     expected_times: ExpectedTimes
+    downloads: Downloads
     watched_jobs: TTLCache[str, Record]
     tokens: Tokens
     limits: RateLimits

@@ -6,7 +6,7 @@ import logging
 from collections.abc import AsyncIterator, Iterator
 from itertools import chain
 
-from fastapi import Request
+from fastapi import Request, Response
 from fastapi.responses import StreamingResponse
 from starlette.concurrency import iterate_in_threadpool
 
@@ -57,3 +57,21 @@ def stream(caller: Caller, request: Request, pieces: Iterator[bytes], media_type
         request.state.connection.abort()
 
     return StreamingResponse(while_valid(), media_type=media_type)
+
+
+def as_file(response: Response, name: str) -> Response:
+    """Let browsers keep an answer as a file.
+
+    Parameters
+    ----------
+    response : Response
+    name : str
+        Of the file.
+
+    Returns
+    -------
+    Response
+        The same.
+    """
+    response.headers["Content-Disposition"] = f'attachment; filename="{name}"'
+    return response

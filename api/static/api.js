@@ -71,6 +71,16 @@ export async function getNumbers(path, signal) {
 }
 
 /**
+ * Get a file.
+ *
+ * @param {string} path
+ * @returns {Promise<Blob>}
+ */
+export async function getBlob(path) {
+  return (await request(path)).blob();
+}
+
+/**
  * Send a document and get the document of the answer.
  *
  * @param {string} path

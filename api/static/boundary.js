@@ -4,6 +4,7 @@ import { changesOf, get } from "./api.js";
 import { otherChanges, phaseDiagram } from "./diagram.js";
 import { DiagramKeys } from "./diagram_keys.js";
 import { definitions, element, table } from "./dom.js";
+import { downloads } from "./downloads.js";
 import { ends, interval, number } from "./format.js";
 import { outcomeLabel } from "./outcomes.js";
 import { Plot } from "./plot.js";
@@ -112,6 +113,7 @@ class BoundaryView {
     this.points = element("section", { "aria-label": "Points of the boundary" });
     this.runs = element("details", { class: "runs" });
     this.reading = element("section", {});
+    this.files = element("div", {});
     this.plot = new Plot(this.figure, signal);
     this.keys = new DiagramKeys(this.plot, status);
     this.plot.on(
@@ -123,7 +125,7 @@ class BoundaryView {
       element(
         "div",
         { class: "columns" },
-        element("div", {}, this.figure, status, this.runs),
+        element("div", {}, this.figure, status, this.files, this.runs),
         element("div", {}, this.points, this.reading),
       ),
     );
@@ -151,6 +153,14 @@ class BoundaryView {
     void this.plot.draw(() => phaseDiagram(boundary, marks, this.compared));
     this.keys.follow(marks);
     this.points.replaceChildren(pointsTable(boundary, marks));
+    if (!this.files.hasChildNodes()) {
+      const key = boundary.study_key;
+      const formats = /** @type {[string, string][]} */ ([
+        ["svg", "figure"],
+        ["csv", "CSV"],
+      ]);
+      this.files.append(downloads(`/boundaries/${key}/file`, `boundary-${key.slice(0, 8)}`, formats));
+    }
     this.#showRuns(boundary, marks);
     this.#addReadingForm(boundary);
   }

@@ -1,5 +1,6 @@
 /** Plots of the diagnostics of a run against time, one below the other. */
 
+import { number } from "./format.js";
 import { axis } from "./plot.js";
 import { color } from "./theme.js";
 
@@ -78,13 +79,14 @@ const PANELS = [
 /** Pixels around the axes, independent of their labels. */
 export const MARGIN = { l: 56, r: 12, t: 22, b: 44 };
 const PANEL_HEIGHT = 132; // pixels
-const GAP = 0.34; // between panels, as a fraction of the height of one
+const GAP = 0.42; // between panels, as a fraction of the height of one
 
 /**
  * @param {Series} series
+ * @param {any} scene
  * @returns {Figure}
  */
-export function histories(series) {
+export function histories(series, scene) {
   const panels = PANELS.map((panel) => ({
     ...panel,
     curves: panel.curves.filter((curve) => curve.series in series),
@@ -102,9 +104,6 @@ export function histories(series) {
     data: panels.flatMap((panel, index) => panel.curves.map((curve) => trace(series, panel, curve, index))),
     layout: {
       ...Object.fromEntries(axes),
-      ...Object.fromEntries(
-        panels.map((_, index) => [axisName("legend", index), legend(axes[index][1].domain[1])]),
-      ),
       height: PANEL_HEIGHT * (panels.length * (1 + GAP)) + 30,
       margin: MARGIN,
       xaxis: axis({
@@ -113,6 +112,7 @@ export function histories(series) {
         automargin: false,
       }),
       annotations: panels.map((panel, index) => heading(panel, axes[index][1].domain[1])),
+      shapes: panels.flatMap((panel, index) => adhesionDistance(panel, scene, index)),
       hovermode: "x",
     },
   };
@@ -129,12 +129,19 @@ function axisName(name, index) {
 }
 
 /**
+ * The title of a panel, and below it the names of its curves if there are several.
+ *
  * @param {Panel} panel
  * @param {number} top
  */
-function heading({ title }, top) {
+function heading({ title, curves }, top) {
+  const names = curves.map(
+    ({ name, color: of }) =>
+      `<span style="color:${color(of)}">━</span> <span style="color:${color("muted")}">${name}</span>`,
+  );
   return {
-    text: title,
+    text: curves.length > 1 ? `${title}<br><span style="font-size:11px">${names.join("  ")}</span>` : title,
+    align: "left",
     xref: "paper",
     yref: "paper",
     x: 0,
@@ -146,13 +153,31 @@ function heading({ title }, top) {
 }
 
 /**
- * The names of a panel's curves, to the right of its title.
+ * A line at the adhesion distance, across the gap, which tends to it.
  *
- * @param {number} top
+ * @param {Panel} panel
+ * @param {any} scene
+ * @param {number} index
  */
-function legend(top) {
-  const font = { size: 11, color: color("muted") };
-  return { orientation: "h", x: 1, y: top, xanchor: "right", yanchor: "bottom", itemwidth: 30, font };
+function adhesionDistance({ title }, scene, index) {
+  const distance = scene.adhesion?.distance;
+  if (title !== "gap" || distance === undefined) {
+    return [];
+  }
+  const label = { text: `δ = ${number(distance)}`, textposition: "end", yanchor: "bottom", font: { size: 11 } };
+  return [
+    {
+      type: "line",
+      xref: "paper",
+      x0: 0,
+      x1: 1,
+      yref: axisName("y", index),
+      y0: distance,
+      y1: distance,
+      line: { color: color("muted"), width: 1, dash: "dot" },
+      label: { ...label, font: { ...label.font, color: color("muted") } },
+    },
+  ];
 }
 
 /**
@@ -170,8 +195,7 @@ function trace(series, panel, curve, index) {
     x: series.time,
     y: series[curve.series].map((value) => (value === null ? null : convert(value))),
     yaxis: axisName("y", index),
-    legend: axisName("legend", index),
-    showlegend: panel.curves.length > 1,
+    showlegend: false,
     line: { color: color(curve.color), width: 1.5 },
     hovertemplate: "%{y:.4g}",
   };

@@ -87,15 +87,25 @@ export function againButtons(job) {
   if (job.status === "succeeded") {
     return [changed];
   }
-  const again = element("button", { class: "primary" }, "Submit again");
-  again.addEventListener("click", async () => {
-    again.disabled = true;
+  const submission = () => get(`/jobs/${job.id}/submission`, new AbortController().signal);
+  return [submitButton("Submit again", submission), changed];
+}
+
+/**
+ * Make a button that submits a job and shows it.
+ *
+ * @param {string} text
+ * @param {() => Promise<any>} submission - Gives what is submitted.
+ */
+export function submitButton(text, submission) {
+  const button = element("button", { class: "primary" }, text);
+  button.addEventListener("click", async () => {
+    button.disabled = true;
     try {
-      const submission = await get(`/jobs/${job.id}/submission`, new AbortController().signal);
-      goTo(`/jobs/${(await post("/jobs", submission)).id}`);
+      goTo(`/jobs/${(await post("/jobs", await submission())).id}`);
     } catch (error) {
-      again.replaceWith(alertAbout(error));
+      button.replaceWith(alertAbout(error));
     }
   });
-  return [again, changed];
+  return button;
 }

@@ -3,6 +3,7 @@
 import { tensionColor, tensionRange } from "./colormap.js";
 import { number } from "./format.js";
 import { color, isDark } from "./theme.js";
+import { refined } from "./trigonometric.js";
 
 /**
  * @typedef {import("./frames.js").Frames} Frames
@@ -18,6 +19,8 @@ const MARGIN = 28;
 const FOOT = 48; // below the drawing, for the color bar and the scale
 const MEMBRANE_THICKNESS = 0.1; // in units of length, within these bounds
 const SHADES = 64; // different colors of the color map
+const SMOOTH = 3; // pixels between points of a curve, at most
+const MOST_REFINED = 8; // times the points
 const BAR = { width: 180, height: 8 };
 
 /** A canvas that follows the mean of the vesicles' centers, with one scale for the whole run. */
@@ -26,11 +29,14 @@ export class MembraneCanvas {
    * @param {HTMLCanvasElement} canvas
    * @param {Frames} frames
    * @param {import("./flow.js").ImposedFlow | null} flow - Null in a fluid at rest.
+   * @param {any} scene - Of the run.
    */
-  constructor(canvas, frames, flow) {
+  constructor(canvas, frames, flow, scene) {
     this.canvas = canvas;
     this.context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
     this.flow = flow;
+    this.distance = scene.adhesion?.distance ?? null;
+    this.longest = Math.max(...scene.vesicles.map((/** @type {any} */ { length }) => length));
     this.range = tensionRange(frames.states);
     this.reach = reachOf(frames.states);
     this.style = pageStyle();
@@ -52,15 +58,27 @@ export class MembraneCanvas {
     const [left, top] = [width / 2, (height - FOOT) / 2];
     context.clearRect(0, 0, width, height);
     this.#drawFlow(width, height - FOOT, scale, [x, y]);
+    const factor = this.#refinement(state, scale);
     const outlines = state.membranes.map((membrane) => ({
-      x: membrane.x.map((value) => left + scale * (value - x)),
-      y: membrane.y.map((value) => top - scale * (value - y)),
-      tension: membrane.tension,
+      x: refined(membrane.x, factor).map((value) => left + scale * (value - x)),
+      y: refined(membrane.y, factor).map((value) => top - scale * (value - y)),
+      tension: refined(membrane.tension, factor),
     }));
     this.#fill(outlines);
     this.#stroke(outlines, thickness);
     this.#drawColorBar(width, height);
     this.#drawScale(height, scale);
+  }
+
+  /**
+   * How many times the computed points a curve needs to look smooth at a scale.
+   *
+   * @param {State} state
+   * @param {number} scale
+   */
+  #refinement({ membranes: [{ x: points }] }, scale) {
+    const spacing = (scale * this.longest) / points.length;
+    return Math.min(Math.max(Math.ceil(spacing / SMOOTH), 1), MOST_REFINED);
   }
 
   /** Give the canvas the resolution of the screen, with coordinates in pixels of the page. */
@@ -201,7 +219,7 @@ export class MembraneCanvas {
   }
 
   /**
-   * A line as long as the unit of length.
+   * A line as long as the unit of length, and one as long as the adhesion distance.
    *
    * @param {number} height
    * @param {number} scale
@@ -211,12 +229,19 @@ export class MembraneCanvas {
     const y = height - FOOT + 26;
     context.strokeStyle = this.style.muted;
     context.lineWidth = 1.2;
-    context.beginPath();
-    context.moveTo(MARGIN, y);
-    context.lineTo(MARGIN + scale, y);
-    context.stroke();
     context.textAlign = "left";
-    context.fillText("length 1", MARGIN, y - 6);
+    const line = (/** @type {number} */ start, /** @type {number} */ length, /** @type {string} */ text) => {
+      context.beginPath();
+      context.moveTo(start, y);
+      context.lineTo(start + length, y);
+      context.stroke();
+      context.fillText(text, start, y - 6);
+      return start + Math.max(length, context.measureText(text).width) + 18;
+    };
+    const next = line(MARGIN, scale, "length 1");
+    if (this.distance !== null) {
+      line(next, scale * this.distance, `δ = ${number(this.distance)}`);
+    }
   }
 }
 

@@ -20,9 +20,10 @@ export class Player extends EventTarget {
   /**
    * @param {Frames} frames
    * @param {import("./flow.js").ImposedFlow | null} flow
+   * @param {any} scene - Of the run.
    * @param {AbortSignal} signal - Stops the player when it is aborted.
    */
-  constructor(frames, flow, signal) {
+  constructor(frames, flow, scene, signal) {
     super();
     this.frames = frames;
     this.signal = signal;
@@ -32,7 +33,7 @@ export class Player extends EventTarget {
 
     const canvas = element("canvas", { role: "img", tabindex: 0 });
     this.canvas = canvas;
-    this.membranes = new MembraneCanvas(canvas, frames, flow);
+    this.membranes = new MembraneCanvas(canvas, frames, flow, scene);
     this.button = element("button", { class: "primary play", onclick: () => this.#toggle() });
     this.clock = element("output", { class: "clock" });
     this.scrubber = element("input", {
@@ -57,6 +58,13 @@ export class Player extends EventTarget {
       ),
     );
     this.element.addEventListener("keydown", (event) => this.#onKey(event));
+    document.addEventListener("keydown", (event) => this.#onSpace(event), { signal });
+    // After a click keys are for the player again, and not for the button.
+    this.element.addEventListener("click", ({ target, detail }) => {
+      if (detail > 0 && target instanceof HTMLButtonElement) {
+        canvas.focus({ preventScroll: true });
+      }
+    });
     window.addEventListener(THEME_CHANGED, () => this.#onTheme(), { signal });
     const observer = new ResizeObserver(() => this.#draw());
     observer.observe(canvas);
@@ -184,6 +192,19 @@ export class Player extends EventTarget {
     this.button.textContent = this.isPlaying ? "Pause" : "Play";
   }
 
+  /**
+   * Play or stop wherever the focus is, unless the space is for what has it: text, a button, a menu.
+   *
+   * @param {KeyboardEvent} event
+   */
+  #onSpace(event) {
+    const takesSpace = "button, select, summary, textarea, input:not([type=range]), dialog *";
+    if (event.key === " " && !(event.target instanceof Element && event.target.matches(takesSpace))) {
+      event.preventDefault();
+      this.#toggle();
+    }
+  }
+
   /** @param {KeyboardEvent} event */
   #onKey(event) {
     const takesKeys = event.target instanceof HTMLButtonElement || event.target instanceof HTMLSelectElement;
@@ -193,7 +214,6 @@ export class Player extends EventTarget {
       ArrowRight: () => this.step(1),
       Home: () => this.rest(this.frames.states[0].time),
       End: () => this.rest(this.frames.end),
-      " ": () => this.#toggle(),
     };
     if (event.key in actions && !takesKeys) {
       event.preventDefault();

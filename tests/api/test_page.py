@@ -10,6 +10,7 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
+import h5netcdf
 import httpx2
 import numpy as np
 import pytest
@@ -156,6 +157,8 @@ def test_a_submitted_study_is_shown_while_its_brackets_close(page: Page, url: st
     expect(page.get_by_text(re.compile("^At most [12][0-9] runs"))).to_be_visible()
 
     page.evaluate("window.isSamePage = true")
+    errors: list[str] = []
+    page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
     page.get_by_role("button", name="Submit").click()
     page.wait_for_url("**/#/jobs/*")
     drawn: list[list[float]] = []
@@ -168,6 +171,7 @@ def test_a_submitted_study_is_shown_while_its_brackets_close(page: Page, url: st
         page.wait_for_timeout(50)
     expect(page.get_by_text("complete", exact=True)).to_be_visible()
     assert page.evaluate("window.isSamePage")
+    assert errors == []
     last = widths(page)
     assert len(last) == 1
     assert max(max(each) for each in drawn if each) > 1.5 * max(last)
@@ -314,12 +318,38 @@ def test_the_player_obeys_the_keyboard(page: Page, url: str, run_path: str, run:
     page.keyboard.press("Home")
     page.keyboard.press("ArrowRight")
     assert clock(page) == times[1]
+    play, pause = (page.get_by_role("button", name=name) for name in ("Play", "Pause"))
     page.keyboard.press(" ")
-    expect(page.get_by_role("button", name="Pause")).to_be_visible()
+    expect(pause).to_be_visible()
     page.keyboard.press(" ")
-    expect(page.get_by_role("button", name="Play")).to_be_visible()
+    expect(play).to_be_visible()
+    # Wherever the focus is, also after a click on another button, unless the space is for that.
+    page.get_by_role("link", name="Run again with changes").focus()
+    page.keyboard.press(" ")
+    expect(pause).to_be_visible()
+    page.get_by_role("button", name="Previous frame").click()
+    page.keyboard.press(" ")
+    expect(pause).to_be_visible()
+    page.get_by_role("button", name="Previous frame").press(" ")
+    expect(play).to_be_visible()
     page.get_by_role("slider", name="Time").fill("7.5")
     assert clock(page) == 7.5
+
+
+def test_curves_between_points_are_those_of_the_fourier_coefficients(page: Page, url: str) -> None:
+    page.goto(url)
+    script = """async ([values, factor]) => {
+        const { refined } = await import(document.scripts[0].src.replace('main', 'trigonometric'));
+        return [...refined(Float32Array.from(values), factor)];
+    }"""
+
+    def curve(points: int) -> Any:
+        s = 2 * np.pi * np.arange(points) / points
+        return 1.5 + np.cos(3 * s - 0.4) - 2 * np.sin(7 * s) + np.cos(8 * s)
+
+    for factor in (1, 4, 8):
+        answer = page.evaluate(script, [curve(16).tolist(), factor])
+        np.testing.assert_allclose(answer, curve(16 * factor), atol=3e-6)
 
 
 def test_states_between_frames_are_cubic(page: Page, url: str) -> None:
@@ -483,6 +513,37 @@ def test_every_preset_and_every_stored_scene_can_be_submitted_as_it_is(
         page.goto(f"{url}/#/new?preset={name}")
         expect(page.get_by_text(re.compile("^(One run|At most .* runs)"))).to_be_visible()
         expect(page.get_by_role("button", name="Submit")).to_be_enabled()
+
+
+def test_runs_and_boundaries_are_saved_as_files(
+    page: Page, url: str, run_path: str, run: Run, boundary: str, tmp_path: Path
+) -> None:
+    page.goto(url + run_path)
+    with page.expect_download() as saved:
+        page.get_by_role("group", name="Download").get_by_role("button", name="HDF5").click()
+    saved.value.save_as(tmp_path / "run.h5")
+    assert saved.value.suggested_filename == f"run-{run_key(run.scene)[:8]}.h5"
+    with h5netcdf.File(tmp_path / "run.h5") as file:
+        np.testing.assert_array_equal(file["gap"][:], run.series["gap"])
+    page.goto(url + boundary)
+    for button, beginning in (("CSV", b"flow.rate,critical adhesion.hamaker,"), ("figure", b"<?xml")):
+        with page.expect_download() as saved:
+            page.get_by_role("button", name=button, exact=True).click()
+        assert saved.value.path().read_bytes().startswith(beginning)
+
+
+def test_an_empty_store_says_so_and_has_a_beginning(page: Page, tmp_path: Path) -> None:
+    with serving(tmp_path / "store") as url:
+        page.goto(url)
+        expect(page.locator("main")).to_contain_text("Nothing is stored yet.")
+        page.get_by_role("button", name="Trace the first boundary").click()
+        expect(page.get_by_role("heading", level=1)).to_have_text("Critical hamaker")
+        page.goto(f"{url}/#/runs")
+        expect(page.locator("main")).to_contain_text("Nothing is stored yet.")
+        page.get_by_role("button", name="Simulate a doublet in shear").click()
+        expect(page.get_by_role("heading", level=1)).to_have_text("Doublet shear")
+        jobs = httpx2.get(f"{url}/jobs").json()["items"]
+        assert [job["name"] for job in jobs] == ["doublet-shear", "critical-hamaker"]
 
 
 def test_a_report_is_shown_with_its_contents(page: Page, url: str, store: Path) -> None:

@@ -4,6 +4,7 @@ import { get, getAll } from "../api.js";
 import { followBoundary } from "../boundary.js";
 import { element } from "../dom.js";
 import { dateAndTime, words } from "../format.js";
+import { submitButton } from "../job.js";
 import { goTo } from "../router.js";
 
 /** @typedef {import("../diagram.js").Boundary} Boundary */
@@ -24,7 +25,8 @@ export async function showBoundaries({ content, parameters, query, signal }) {
   boundaries.sort((first, second) => second.updated.localeCompare(first.updated));
   const key = parameters.key ?? boundaries[0]?.study_key;
   if (key === undefined) {
-    content.replaceChildren(...invitation());
+    const { items } = await get("/runs?limit=1", signal);
+    content.replaceChildren(...invitation(items.length > 0));
     return;
   }
   const shownBoundary = boundaries.find(({ study_key }) => study_key === key) ?? (await get(`/boundaries/${key}`, signal));
@@ -38,7 +40,8 @@ export async function showBoundaries({ content, parameters, query, signal }) {
   await followBoundary(shown, key, signal, compared);
 }
 
-function invitation() {
+/** @param {boolean} hasRuns */
+function invitation(hasRuns) {
   const ways = BEGINNINGS.map(([preset, question, answer]) =>
     element(
       "li",
@@ -51,9 +54,10 @@ function invitation() {
     element(
       "p",
       { class: "lead" },
-      "No boundary has been traced in this store yet. A study finds, for each value of one parameter, the " +
-        "critical value of another, and keeps every simulation behind it.",
+      `${hasRuns ? "No boundary has been traced in this store yet." : "Nothing is stored yet."} A study finds, for ` +
+        "each value of one parameter, the critical value of another, and keeps every simulation behind it.",
     ),
+    element("p", {}, submitButton("Trace the first boundary", async () => ({ preset: BEGINNINGS[0][0] }))),
     element("nav", { class: "shelf", "aria-label": "Examples to begin with" }, element("ul", {}, ...ways)),
   ];
 }

@@ -6,7 +6,7 @@ import { definitions, element } from "../dom.js";
 import { dateAndTime, duration, words } from "../format.js";
 import { againButtons, cancelButton, isUnfinished, progressOf, resultLink } from "../job.js";
 import { kindNamed } from "../kinds.js";
-import { Problem, alertAbout, messageOf } from "../problems.js";
+import { alertAbout, messageOf } from "../problems.js";
 
 /** @typedef {import("../job.js").Job} Job */
 
@@ -89,13 +89,14 @@ function showResult(place, job, signal) {
     return;
   }
   place.dataset.followed = "true";
-  followBoundary(place, job.key, signal).catch((error) => {
-    if (signal.aborted) {
-      return;
+  const show = async () => {
+    // Asked for in a list, which is empty until the boundary exists, at an event of the job soon.
+    const { items } = await get(`/boundaries?where=study_key=${job.key}`, signal);
+    if (items.length > 0) {
+      await followBoundary(place, job.key, signal);
+    } else {
+      delete place.dataset.followed;
     }
-    delete place.dataset.followed; // the boundary does not exist yet; try again at the next event
-    if (!(error instanceof Problem && error.status === 404)) {
-      place.replaceChildren(alertAbout(error));
-    }
-  });
+  };
+  show().catch((error) => signal.aborted || place.replaceChildren(alertAbout(error)));
 }

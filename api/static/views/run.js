@@ -3,6 +3,7 @@
 import { get } from "../api.js";
 import { Cursor } from "../cursor.js";
 import { definitions, element } from "../dom.js";
+import { downloads } from "../downloads.js";
 import { ImposedFlow } from "../flow.js";
 import { dateAndTime, duration, number } from "../format.js";
 import { Frames } from "../frames.js";
@@ -41,12 +42,12 @@ export async function showRun({ content, parameters, query, signal }) {
   ]);
   loading.remove();
   const plot = new Plot(plots, signal);
-  const drawn = plot.draw(() => histories(series));
+  const drawn = plot.draw(() => histories(series, run.scene));
   if (frames.states.length === 0) {
     stage.append(element("p", { class: "alert" }, "This run has no recorded state that can be drawn."));
     return drawn;
   }
-  const player = new Player(frames, flow, signal);
+  const player = new Player(frames, flow, run.scene, signal);
   stage.append(player.element);
   player.canvas.setAttribute("aria-label", `${describe(run.scene)}: membranes colored by tension`);
   keepTime(player, query);
@@ -91,6 +92,11 @@ function heading({ key, outcome, time, scene, failure }) {
     element("h1", {}, outcomeLabel(outcome)),
     element("a", { class: "button", href: `#/new?run=${key}` }, "Run again with changes"),
     element("p", {}, `${describe(scene)}; ${verb} at t = ${number(time)}`),
+    downloads(`/runs/${key}/file`, `run-${key.slice(0, 8)}`, [
+      ["gif", "movie"],
+      ["svg", "figure"],
+      ["h5", "HDF5"],
+    ]),
     failure ? element("p", { class: "alert" }, failure) : null,
   );
 }

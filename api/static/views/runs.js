@@ -3,6 +3,7 @@
 import { get } from "../api.js";
 import { element, tableRow } from "../dom.js";
 import { dateAndTime, number } from "../format.js";
+import { submitButton } from "../job.js";
 import { MARKS, outcomeLabel } from "../outcomes.js";
 import { alertAbout } from "../problems.js";
 import { goTo } from "../router.js";
@@ -41,7 +42,12 @@ export async function showRuns({ content, query, signal }) {
     rows.append(...page.items.map(row));
     next = page.next;
     more.hidden = next === null;
-    count.textContent = rows.rows.length === 0 ? "No run meets these conditions." : "";
+    if (rows.rows.length === 0 && where.length === 0) {
+      const start = submitButton("Simulate a doublet in shear", async () => ({ preset: "doublet-shear" }));
+      count.replaceWith(element("p", { class: "lead" }, "Nothing is stored yet."), element("p", {}, start));
+    } else {
+      count.textContent = rows.rows.length === 0 ? "No run meets these conditions." : "";
+    }
   };
   more.addEventListener("click", () => load().catch((error) => more.replaceWith(alertAbout(error))));
   await load();

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+
 import pytest
 
 from ensemble.search.boundary import Boundary
@@ -122,3 +124,16 @@ def test_a_boundary_without_a_converged_point_has_no_value(tmp_path):
         response = client.get(f"/boundaries/{boundary.study_key}/at", params={"flow.rate": 1})
         assert response.status_code == 422
         assert "converged" in response.json()["detail"]
+
+
+def test_a_boundary_is_given_as_a_table(reading, address):
+    answer = reading.get(f"{address}/file", params={"format": "csv"})
+    assert answer.headers["content-type"] == "text/csv; charset=utf-8"
+    assert 'filename="boundary-' in answer.headers["content-disposition"]
+    *rows, searching = csv.DictReader(answer.text.splitlines())
+    assert [float(row["flow.rate"]) for row in rows] == list(SWEEP)
+    assert [float(row["bracket low"]) for row in rows] == [critical(rate) / 1.005 for rate in SWEEP]
+    assert {(row["outcome below"], row["outcome above"]) for row in rows} == {("separated", "bound")}
+    assert (searching["status"], searching["bracket high"]) == ("searching", "")
+    assert reading.get(f"/boundaries/{'0' * 16}/file?format=csv").status_code == 404
+    assert reading.get(f"{address}/file?format=exe").status_code == 422

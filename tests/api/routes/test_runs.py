@@ -34,6 +34,14 @@ def bound_run(filled_store: Path, reading: httpx2.Client) -> str:
         return store.summaries(["flow.rate=0.75"])[0].key
 
 
+def test_a_run_is_given_as_a_figure(reading, bound_run):
+    answer = reading.get(f"/runs/{bound_run}/file?format=png")
+    assert answer.headers["content-type"] == "image/png"
+    assert answer.headers["content-disposition"] == f'attachment; filename="run-{bound_run[:8]}.png"'
+    assert answer.content.startswith(b"\x89PNG")
+    assert reading.get(f"/runs/{'0' * 32}/file?format=png").status_code == 404
+
+
 def found(client: httpx2.Client, **query: object) -> list[dict]:
     response = client.get("/runs", params=query)
     assert response.status_code == 200, response.text
