@@ -18,8 +18,7 @@ from pathlib import Path
 from threading import Semaphore
 from typing import Any, BinaryIO
 
-from api.http.problems import unavailable
-from ensemble.errors import BadInput
+from ensemble.errors import BadInput, EnsembleError
 from ensemble.search.boundary import Boundary
 
 SECONDS = 300.0  # until a file is given up
@@ -27,6 +26,10 @@ AT_A_TIME = 2  # each keeps a thread of the service
 PIECE_BYTES = 1 << 16
 
 _REFUSED = 2  # exit status
+
+
+class NoFile(EnsembleError):  # noqa: N818
+    """A file could not be made now; perhaps later."""
 
 
 class RunFile(StrEnum):
@@ -95,11 +98,11 @@ class Downloads:
         ------
         BadInput
             If it cannot be made, such as a movie without an encoder.
-        Problem
+        NoFile
             If it takes too long, or too many files are asked for.
         """
         if not self._free.acquire(blocking=False):
-            raise unavailable("other files are being made; ask again later")
+            raise NoFile("other files are being made; ask again later")
         try:
             with tempfile.TemporaryDirectory(prefix="ensemble-download-") as folder:
                 path = Path(folder, f"{key}.{suffix}")
@@ -122,12 +125,12 @@ class Downloads:
                 check=False,
             )
         except subprocess.TimeoutExpired:
-            raise unavailable(f"the file was not made within {SECONDS:g} s") from None
+            raise NoFile(f"the file was not made within {SECONDS:g} s") from None
         if result.returncode != 0:
             said = result.stderr.strip().splitlines()[-1:] or ["it was ended"]
             if result.returncode == _REFUSED:
                 raise BadInput(said[0])
-            raise unavailable(f"the file could not be made: {said[0]}")
+            raise NoFile(f"the file could not be made: {said[0]}")
 
 
 def _read(file: BinaryIO) -> Iterator[bytes]:

@@ -20,7 +20,7 @@ from api.results.boundary_values import (
 )
 from api.results.downloads import MEDIA_TYPES, BoundaryFile, boundary_table, file_response
 from api.routes.service import Reader
-from api.routes.streaming import as_file, stream
+from api.routes.streaming import as_file, stream_file
 from ensemble.errors import BadInput
 from ensemble.store import Record
 
@@ -168,13 +168,12 @@ def get_boundary_file(
     NotStored
         If there is no boundary of this key.
     """
-    service = reader.service
-    boundary = service.store.boundary(key)
+    boundary = reader.service.store.boundary(key)
 
     def make() -> Response:
         if format is BoundaryFile.CSV:
             return Response(boundary_table(boundary), media_type=MEDIA_TYPES[format])
-        return stream(reader, request, service.downloads.pieces(key, format), MEDIA_TYPES[format])
+        return stream_file(reader, request, key, format)
 
     tag = etag(boundary.model_dump_json(), "file", format)
     return as_file(cached_response(request, tag, REVALIDATE, make), f"boundary-{key[:8]}.{format}")

@@ -11,11 +11,11 @@ from pydantic import StringConstraints
 from api.http.caching import IMMUTABLE, JSON, NOT_MODIFIED, cached_response, etag, json_response
 from api.http.paging import After, CollectionPage, Limit, Where, page_response
 from api.http.problems import documented
-from api.results.downloads import MEDIA_TYPES, RunFile, file_response
+from api.results.downloads import RunFile, file_response
 from api.results.flow_field import FlowField, flow_field
 from api.results.run_arrays import FramesDocument, FrameSelection, SeriesDocument, SeriesSelection, centers
 from api.routes.service import Reader
-from api.routes.streaming import as_file, stream
+from api.routes.streaming import as_file, stream, stream_file
 from ensemble.store.run_record import RunSummary
 
 BINARY = "application/octet-stream"
@@ -240,11 +240,9 @@ def get_file(
     BadInput
         If the run cannot be drawn so.
     """
-    service = reader.service
-    service.store.run_record(key)
+    reader.service.store.run_record(key)
 
     def make() -> Response:
-        pieces = service.downloads.pieces(key, format)
-        return as_file(stream(reader, request, pieces, MEDIA_TYPES[format]), f"run-{key[:8]}.{format}")
+        return as_file(stream_file(reader, request, key, format), f"run-{key[:8]}.{format}")
 
     return cached_response(request, etag(key, "file", format), IMMUTABLE, make)

@@ -10,7 +10,8 @@ from fastapi import Request, Response
 from fastapi.responses import StreamingResponse
 from starlette.concurrency import iterate_in_threadpool
 
-from api.http.problems import OUTAGES
+from api.http.problems import OUTAGES, unavailable
+from api.results.downloads import MEDIA_TYPES, NoFile
 from api.routes.service import Caller
 from ensemble.store.sql_database import reason
 
@@ -57,6 +58,35 @@ def stream(caller: Caller, request: Request, pieces: Iterator[bytes], media_type
         request.state.connection.abort()
 
     return StreamingResponse(while_valid(), media_type=media_type)
+
+
+def stream_file(caller: Caller, request: Request, key: str, suffix: str) -> Response:
+    """Return a run or a boundary as a file that is made for it.
+
+    Parameters
+    ----------
+    caller : Caller
+        Who makes the request.
+    request : Request
+    key : str
+        Of a run or a boundary that is stored.
+    suffix : str
+        Of the file.
+
+    Returns
+    -------
+    Response
+
+    Raises
+    ------
+    Problem
+        If the file cannot be made now.
+    """
+    try:
+        pieces = caller.service.downloads.pieces(key, suffix)
+    except NoFile as error:
+        raise unavailable(str(error)) from error
+    return stream(caller, request, pieces, MEDIA_TYPES[suffix])
 
 
 def as_file(response: Response, name: str) -> Response:
