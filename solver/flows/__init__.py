@@ -5,6 +5,7 @@ from typing import Annotated
 from solver.flows.extension import Extension
 from solver.flows.imposed_flow import ImposedFlow, Symbol
 from solver.flows.linear import Linear
+from solver.flows.poiseuille import Poiseuille
 from solver.flows.shear import Shear
 from solver.flows.trap import Trap
 from solver.registry import Registry
@@ -14,7 +15,8 @@ FLOWS.add(Shear)
 FLOWS.add(Extension)
 FLOWS.add(Trap)
 FLOWS.add(Linear)
+FLOWS.add(Poiseuille)
 
 Flow = Annotated[ImposedFlow, FLOWS]  # the type of a field that holds any of them
 
-__all__ = ["FLOWS", "Extension", "Flow", "ImposedFlow", "Linear", "Shear", "Symbol", "Trap"]
+__all__ = ["FLOWS", "Extension", "Flow", "ImposedFlow", "Linear", "Poiseuille", "Shear", "Symbol", "Trap"]

@@ -40,7 +40,7 @@ def printed(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[ModuleTy
     """
     name = f"printed_{request.node.name}"
     file = tmp_path / f"{name}.py"
-    file.write_text(guide(request.param).replace('"poiseuille"', '"printed-poiseuille"'))
+    file.write_text(guide(request.param).replace('"kolmogorov"', '"printed-kolmogorov"'))
     specification = importlib.util.spec_from_file_location(name, file)
     assert specification
     assert specification.loader
@@ -53,16 +53,16 @@ def printed(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[ModuleTy
 
 @pytest.mark.parametrize("printed", ["Add a flow"], indirect=True)
 def test_a_flow(printed: ModuleType) -> None:
-    """A vesicle off the axis of a channel flow drifts toward the axis, and a pair is not halved."""
-    flow = {"kind": "printed-poiseuille", "rate": 1.0, "half_width": 4.0}
-    FLOWS.add(printed.Poiseuille)
+    """A vesicle off the axis drifts toward the axis, and a pair is not halved."""
+    flow = {"kind": "printed-kolmogorov", "rate": 1.0, "length": 4.0}
+    FLOWS.add(printed.Kolmogorov)
     try:
         vesicle = {"reduced_area": 0.9, "center": [0.0, 1.5]}
         numerics = {"points": 32, "tolerance": 1e-3}
         run = simulate(Scene(horizon=5.0, vesicles=[vesicle], flow=flow, numerics=numerics))
         pair = Scene(horizon=5.0, vesicles=[{"center": [-1.5, 0.0]}, {"center": [1.5, 0.0]}], flow=flow)
     finally:
-        FLOWS.remove(printed.Poiseuille)
+        FLOWS.remove(printed.Kolmogorov)
     assert run.outcome is Outcome.UNDECIDED
     assert np.abs(run.frames.center[-1, 0, 1]) < 1.5
     assert run.frames.center[-1, 0, 0] > 10.0

@@ -35,7 +35,7 @@ PUBLISHED = (
     "vesicle-shear",
 )
 MANY = ("cluster-quiescent", "suspension-shear")
-SCENES = (*PUBLISHED, *MANY, "doublet-linear", "doublet-ramp", "doublet-unequal")
+SCENES = (*PUBLISHED, *MANY, "doublet-linear", "doublet-ramp", "vesicle-poiseuille", "doublet-unequal")
 
 HAMAKER = load_study("critical-hamaker")
 
@@ -65,7 +65,7 @@ def test_every_preset_says_what_it_is_and_where_it_comes_from(name: str) -> None
         Path(__file__).parents[3].joinpath("ensemble", "presets", f"{name}.toml").read_text(encoding="utf-8")
     )
     comment = [line for line in text.split("\n\n")[0].splitlines() if line.startswith("# ")]
-    sources = ("Quaife, Veerapaneni and Young", "Keller and Skalak")
+    sources = ("Quaife, Veerapaneni and Young", "Keller and Skalak", "Kaoui, Biros and Misbah")
     assert any(source in line for line in comment for source in sources)
 
 

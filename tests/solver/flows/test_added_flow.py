@@ -26,45 +26,45 @@ from tests.solver.scenes import smooth_direction, uneven_pair
 Array = NDArray[np.float64]
 
 
-class Poiseuille(ImposedFlow):
-    """Velocity rate·(w − y²/w, 0): fastest at y = 0, so that it is not odd."""
+class Kolmogorov(ImposedFlow):
+    """Velocity rate·(ℓ cos(y/ℓ), 0): fastest at y = 0, so that it is not odd."""
 
-    kind: Literal["added-poiseuille"] = "added-poiseuille"
-    half_width: Annotated[Positive, LENGTH] = 5.0
+    kind: Literal["added-kolmogorov"] = "added-kolmogorov"
+    length: Annotated[Positive, LENGTH] = 5.0
 
-    title = "Poiseuille flow"
+    title = "Kolmogorov flow"
     symbols = {"rate": Symbol("shear rate", r"\dot{\gamma}", "γ̇")}  # noqa: RUF012  as in its base
 
     def velocity(self, points: Array, centers: Array) -> Array:
-        y = points[1]
-        return self.rate * np.stack([self.half_width - y**2 / self.half_width, np.zeros_like(y)])
+        along = self.rate * self.length * np.cos(points[1] / self.length)
+        return np.stack([along, np.zeros_like(along)])
 
     def velocity_gradient(self, points: Array) -> Array:
         gradient = np.zeros((2, *points.shape))
-        gradient[0, 1] = -2 * self.rate / self.half_width * points[1]
+        gradient[0, 1] = -self.rate * np.sin(points[1] / self.length)
         return gradient
 
 
 @pytest.fixture(autouse=True)
-def poiseuille() -> Iterator[None]:
-    FLOWS.add(Poiseuille)
+def kolmogorov() -> Iterator[None]:
+    FLOWS.add(Kolmogorov)
     yield
-    FLOWS.remove(Poiseuille)
+    FLOWS.remove(Kolmogorov)
 
 
 DOCUMENT = """
     horizon = 3.0
     vesicles = [{ center = [-1.6, 0.4] }, { center = [1.6, -0.4] }]
-    flow = { kind = "added-poiseuille", rate = 0.2, half_width = 4.0 }
+    flow = { kind = "added-kolmogorov", rate = 0.2, length = 4.0 }
 """
 
 
 def test_documents_name_it() -> None:
     scene = Scene.model_validate(tomllib.loads(DOCUMENT))
-    assert scene.flow == Poiseuille(rate=0.2, half_width=4.0)
+    assert scene.flow == Kolmogorov(rate=0.2, length=4.0)
     assert Scene.model_validate_json(scene.model_dump_json(), strict=True) == scene
-    with pytest.raises(ValidationError, match=r"(?s)flow.half_width.*greater than 0"):
-        Scene.model_validate_json('{"horizon": 1, "flow": {"kind": "added-poiseuille", "half_width": 0}}')
+    with pytest.raises(ValidationError, match=r"(?s)flow.length.*greater than 0"):
+        Scene.model_validate_json('{"horizon": 1, "flow": {"kind": "added-kolmogorov", "length": 0}}')
 
 
 def test_a_pair_that_a_half_turn_leaves_as_it_is_moves_along() -> None:
@@ -85,7 +85,7 @@ def test_a_pair_that_a_half_turn_leaves_as_it_is_moves_along() -> None:
 
 def test_the_equation_of_motion_has_its_exact_jacobian() -> None:
     """Against fourth-order differences of the rate, along a smooth change of state."""
-    scene = uneven_pair(flow=Poiseuille(rate=0.4), numerics=Numerics(points=96, tolerance=1e-9))
+    scene = uneven_pair(flow=Kolmogorov(rate=0.4), numerics=Numerics(points=96, tolerance=1e-9))
     equation, state, step = dense_equation(scene), initial_ellipses(scene), 1e-3
     direction = smooth_direction(equation.membranes)
     rates = [equation.rate(state + k * step * direction) for k in (-2, -1, 1, 2)]
@@ -95,9 +95,9 @@ def test_the_equation_of_motion_has_its_exact_jacobian() -> None:
 
 
 def test_it_is_unknown_once_removed() -> None:
-    FLOWS.remove(Poiseuille)
+    FLOWS.remove(Kolmogorov)
     try:
-        with pytest.raises(ValidationError, match=r"'added-poiseuille'.*expected tags: 'shear'"):
+        with pytest.raises(ValidationError, match=r"'added-kolmogorov'.*expected tags: 'shear'"):
             Scene.model_validate(tomllib.loads(DOCUMENT))
     finally:
-        FLOWS.add(Poiseuille)
+        FLOWS.add(Kolmogorov)
