@@ -14,6 +14,7 @@ import shutil
 from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from functools import lru_cache
 from itertools import accumulate
 from pathlib import Path
 
@@ -24,6 +25,8 @@ from ensemble.errors import StoreError
 from solver.analysis.record import FRAMES, Block, Sink, with_points
 from solver.analysis.run import Array
 from solver.memory import Saved
+
+_CACHED = 16  # blocks, while arrays are read one after the other
 
 
 class RecordedBlocks(Sink):
@@ -234,6 +237,7 @@ def recorded_arrays(
     dict of str to dict of str to RecordedArray
         By the part of the record, and by name.
     """
+    read = lru_cache(_CACHED)(read)
 
     def of_part(part: str, count: int) -> dict[str, RecordedArray]:
         rows = [len(next(iter(read(part, number).values()))) for number in range(count)]

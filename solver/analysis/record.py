@@ -144,11 +144,14 @@ class OpenBlock(Remembering):
         row : mapping
             Its values by name.
         """
+        rows = self._rows
+        if not rows:
+            rows.update({name: [] for name in row})
         for name, value in row.items():
-            self._rows.setdefault(name, []).append(value)
+            rows[name].append(value)
         if not self._row_bytes:
             self._row_bytes = sum(np.asarray(value).nbytes for value in row.values())
-        if len(next(iter(self._rows.values()))) * self._row_bytes >= BLOCK_BYTES:
+        if len(rows[name]) * self._row_bytes >= BLOCK_BYTES:
             self.hand_over()
 
     def hand_over(self) -> None:
