@@ -424,19 +424,23 @@ class Client(AbstractContextManager["Client"]):
         answer = self.get(f"/boundaries/{key}/at", params={**parameters, "method": str(method)})
         return CriticalValueDocument.model_validate_json(answer.content)
 
-    def runs(self, *where: str) -> Iterator[StoredRun]:
+    def runs(self, *where: str, reports: bool = False) -> Iterator[StoredRun]:
         """Return the runs that meet all conditions, the newest first.
 
         Parameters
         ----------
         *where : str
             Conditions, for example ``outcome=bound`` or ``flow.rate>=0.5``.
+        reports : bool
+            Whether runs that were made for reports are among them.
 
         Returns
         -------
         iterator of StoredRun
         """
-        summaries = map(RunSummary.model_validate, self._items("/runs", {"where": list(where)}))
+        summaries = map(
+            RunSummary.model_validate, self._items("/runs", {"where": list(where), "reports": reports})
+        )
         return (StoredRun(summary, self) for summary in summaries)
 
     def run(self, key: str) -> StoredRun:

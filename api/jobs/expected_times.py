@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from statistics import fmean
@@ -114,10 +113,11 @@ class ExpectedTimes:
             run = json.loads(record.json)
             outcome, work = run["outcome"], run["work"]
             seconds, time = work["wall_seconds"], run["time"]
-            if outcome == Outcome.FAILED or not all(map(math.isfinite, (seconds, time))):
+            points = work.get("points")  # old records lack it
+            if outcome == Outcome.FAILED or points is None:
                 continue
             is_decided = outcome not in _DECIDED_BY_THE_HORIZON
-            past[_Likeness.of(run["scene"])].append(_PastRun(seconds, work["points"], time, is_decided))
+            past[_Likeness.of(run["scene"])].append(_PastRun(seconds, points, time, is_decided))
         return past
 
 

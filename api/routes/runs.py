@@ -16,6 +16,7 @@ from api.results.flow_field import FlowField, flow_field
 from api.results.run_arrays import FramesDocument, FrameSelection, SeriesDocument, SeriesSelection, centers
 from api.routes.service import Reader
 from api.routes.streaming import as_file, stream, stream_file
+from ensemble.store.listing import without_reports
 from ensemble.store.run_record import RunSummary
 
 BINARY = "application/octet-stream"
@@ -48,6 +49,7 @@ def list_runs(
     where: Where = [],  # noqa: B006  FastAPI copies it
     after: After = None,
     limit: Limit = 100,
+    reports: Annotated[bool, Query(description="Whether those made for reports are listed.")] = False,
 ) -> Response:
     """List the runs that meet all conditions, the newest first.
 
@@ -61,12 +63,15 @@ def list_runs(
         Key of the last item of the previous page.
     limit : int
         Largest number of items.
+    reports : bool
+        Whether runs that were made for reports are listed.
 
     Returns
     -------
     Response
     """
-    return page_response(request, reader.service.store.runs_page(where, after, limit + 1), limit)
+    filters = where if reports else without_reports(where)
+    return page_response(request, reader.service.store.runs_page(filters, after, limit + 1), limit)
 
 
 @router.get("/{key}", response_model=RunSummary, responses=RUN_RESPONSES)

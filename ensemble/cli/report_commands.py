@@ -71,7 +71,10 @@ def _paper(only: list[str], quick: bool, store: Path, ranks_per_run: str | None)
     with abort_guard(communicator):
         # Its scenes have one vesicle or two.
         ranks = chosen_ranks(ranks_per_run or "1", load_scene("doublet-shear"), communicator.Get_size())
-        with store_on_ranks(communicator, store) as opened, report_progress(Console(stderr=True)) as log:
+        with (
+            store_on_ranks(communicator, store, ReportName.PAPER) as opened,
+            report_progress(Console(stderr=True)) as log,
+        ):
             return make_paper(communicator, opened, sections, quick, log, ranks)
 
 
@@ -87,7 +90,7 @@ def _scaling(quick: bool, store: Path) -> FinishedReport | None:
     communicator = world()
     with (
         abort_guard(communicator),
-        store_on_ranks(communicator, store) as opened,
+        store_on_ranks(communicator, store, ReportName.SCALING) as opened,
         report_progress(Console(stderr=True)) as log,
     ):
         return make_scaling(communicator, opened, quick, log)
@@ -105,12 +108,12 @@ def _measurements(name: ReportName, quick: bool, store: Path) -> FinishedReport 
 
     with ExitStack() as stack:
         with refusing():
-            opened = stack.enter_context(_opened(store))
+            opened = stack.enter_context(_opened(store, name))
         make = make_stability if name is ReportName.STABILITY else make_work_precision
         return make(opened, quick, stack.enter_context(report_progress(Console(stderr=True))))
 
 
-def _opened(path: Path) -> Store:
+def _opened(path: Path, report: ReportName) -> Store:
     from ensemble.store import Store
 
-    return Store.open(path)
+    return Store.open(path, report)

@@ -61,12 +61,16 @@ def query(  # numpydoc ignore=PR01
     sort: Sort = None,
     limit: Limit = LISTED,
     columns: Columns = [],  # noqa: B006
+    reports: Annotated[bool, typer.Option("--reports", help="List runs made for reports, too.")] = False,
     store: StorePath = DEFAULT_STORE,
     as_json: AsJson = False,
 ) -> None:
     """List the runs, the boundaries or the branches of steady states of a store."""
-    from ensemble.store.listing import Listing
+    from ensemble.questions.scene_question import SceneQuestion
+    from ensemble.store.listing import Listing, without_reports
 
+    if collection == SceneQuestion.collection and not reports:
+        where = [*without_reports(where)]
     # One more, to know whether there are more.
     listing = Listing(tuple(where), sort, limit + 1 if limit else None)
     paths = [path.strip() for column in columns for path in column.split(",")]

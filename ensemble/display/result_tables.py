@@ -165,7 +165,7 @@ def list_table(columns: Sequence[ListColumn], documents: Iterable[Mapping[str, A
     first, *others = (column.heading for column in columns)
     table = Table(_whole(first), *map(_folded, others))
     for document in documents:
-        table.add_row(*(escape(list_cell(column.value(document))) for column in columns))
+        table.add_row(*(escape(list_cell(column.value(document))[: column.width]) for column in columns))
     return table
 
 

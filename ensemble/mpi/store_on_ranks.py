@@ -38,7 +38,9 @@ def whole_store(store: StoreOnRank) -> Store:
 
 
 @contextmanager
-def store_on_ranks(communicator: Intracomm | None, path: Path) -> Iterator[StoreOnRank]:
+def store_on_ranks(
+    communicator: Intracomm | None, path: Path, report: str | None = None
+) -> Iterator[StoreOnRank]:
     """Open a store to write to, on all ranks of a communicator.
 
     Only the first rank has a connection to the catalog: SQLite files on a network file system must be used
@@ -50,6 +52,8 @@ def store_on_ranks(communicator: Intracomm | None, path: Path) -> Iterator[Store
         All ranks; None if this process is alone.
     path : Path
         As the first rank understands it.
+    report : str, optional
+        Name of the report that runs are made for.
 
     Yields
     ------
@@ -71,8 +75,8 @@ def store_on_ranks(communicator: Intracomm | None, path: Path) -> Iterator[Store
             nonlocal store
             checkpoint_seconds()  # refused before there is a store
             with refusing():
-                store = stack.enter_context(Store.open(path))
+                store = stack.enter_context(Store.open(path, report))
             return store.path
 
         resolved = on_root(communicator, open_store)
-        yield store if store is not None else stack.enter_context(RunStaging(resolved))
+        yield store if store is not None else stack.enter_context(RunStaging(resolved, report))

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from ensemble.config.measured import Measured, measured_document, measured_fields
 from ensemble.config.run_key import run_key
-from ensemble.questions.question import Answer, Question, StoredAnswer, StoredAnswers, where_kept
+from ensemble.questions.question import SHORT_KEY, Answer, Question, StoredAnswer, StoredAnswers, where_kept
 from ensemble.questions.size_limits import MOST_VESICLES, limit_vesicles
 from solver.scene import Scene, Units
 
@@ -32,7 +32,9 @@ _COLUMNS = {
     "flow": "flow.kind",
     "rate": "flow.rate",
     "hamaker": "adhesion.hamaker",
-    "revision": "results_revision",
+    "integrator": "numerics.integrator",
+    "points": "work.points",
+    "rev": "results_revision",
 }
 _WORK = ("points", "steps", "rejected_steps", "rhs_evaluations", "wall_seconds")
 _RESULTS = (
@@ -211,7 +213,8 @@ class SceneQuestion(Question[Scene]):
         from ensemble.store.columns import column_of, columns_of
 
         shown = columns_of(columns, RUN_FIELDS) or tuple(
-            column_of(path, RUN_FIELDS, heading) for heading, path in _COLUMNS.items()
+            column_of(path, RUN_FIELDS, heading)._replace(width=SHORT_KEY if path == "key" else None)
+            for heading, path in _COLUMNS.items()
         )
         return StoredAnswers((json.loads(record.json) for record in store.run_records(listing)), shown)
 

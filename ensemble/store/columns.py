@@ -16,10 +16,13 @@ class ListColumn(NamedTuple):
     heading : str
     value : callable
         What is shown of a document; None if it lacks it.
+    width : int or None
+        How many characters of it are enough for people; None for all.
     """
 
     heading: str
     value: Callable[[Mapping[str, Any]], Any]
+    width: int | None = None
 
 
 def column_of(path: str, fields: Fields, heading: str | None = None) -> ListColumn:

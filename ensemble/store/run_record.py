@@ -50,6 +50,8 @@ class RunSummary(BaseModel):
         The solver's `RESULTS_REVISION`; None in records from before there was one.
     series, vesicle_series : tuple of str
         Names of the recorded diagnostics.
+    report : str or None
+        Name of the report that it was made for; None if it was asked for by itself or by a study.
     """
 
     # Strings keep NaN and infinity, which a failed run may carry, inside the JSON standard.
@@ -79,6 +81,7 @@ class RunSummary(BaseModel):
     series: tuple[str, ...]
     vesicle_series: tuple[str, ...] = ()
     perturbations: tuple[Annotated[float, TIME], ...] = ()
+    report: str | None = None
 
     def in_units(self, units: Units | None) -> Self:
         """Return the summary of the same run with other units, or none, of its scene.
@@ -143,7 +146,7 @@ class RunSummary(BaseModel):
         )
 
 
-_OTHERS = ("key", "created", "versions", "results_revision", "series", "vesicle_series")
+_OTHERS = ("key", "created", "versions", "results_revision", "series", "vesicle_series", "report")
 # The fields of a run that its summary holds unchanged.
 RESULTS = tuple(name for name in RunSummary.model_fields if name not in _OTHERS)
 

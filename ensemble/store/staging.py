@@ -66,9 +66,12 @@ class RunStaging(AbstractContextManager["RunStaging"]):
     ----------
     store : Path
         Directory of the store.
+    report : str, optional
+        Name of the report that its runs are made for.
     """
 
-    def __init__(self, store: Path) -> None:
+    def __init__(self, store: Path, report: str | None = None) -> None:
+        self._report = report
         # Resolved, so that a staged run means the same to a process in another working directory.
         self.path = store.resolve()
         self._directory = self.path / STAGING / uuid4().hex
@@ -96,7 +99,7 @@ class RunStaging(AbstractContextManager["RunStaging"]):
             If the run could not be written for `DISK_SECONDS`.  It is kept in the directory for temporary
             files, if it can be.
         """
-        return self._stage(RunSummary.of(run) if summary is None else summary, arrays(run))
+        return self._stage(self._own(RunSummary.of(run)) if summary is None else summary, arrays(run))
 
     def stage_recorded(self, results: RunResults, record: RecordedBlocks) -> Staged:
         """Write a run to disk of which this process has recorded the arrays; see `stage`.
@@ -118,11 +121,15 @@ class RunStaging(AbstractContextManager["RunStaging"]):
         """
         parts = record.parts(results.work.points)
         staged = self._stage(
-            RunSummary.of_parts(results, parts["series"], parts.get("vesicle_series", ())),
+            self._own(RunSummary.of_parts(results, parts["series"], parts.get("vesicle_series", ()))),
             named_arrays(parts, results.scene.units),
         )
         record.remove()
         return staged
+
+    def _own(self, summary: RunSummary) -> RunSummary:
+        """Return the summary of a run that this process has made, with the report that it is for."""
+        return summary.model_copy(update={"report": self._report})
 
     def _stage(self, summary: RunSummary, named: Mapping[str, NamedArray]) -> Staged:
         try:

@@ -63,18 +63,20 @@ class Store(AbstractContextManager["Store"]):
         The directory.
     read_only : bool
         Whether this process only reads: then it leaves no trace.
+    report : str, optional
+        Name of the report that the runs of this process are made for.
     """
 
-    def __init__(self, path: Path, read_only: bool = False) -> None:
+    def __init__(self, path: Path, read_only: bool = False, report: str | None = None) -> None:
         self.path = path.resolve()
         self._runs = self.path / RUNS
         self._lock = self.path / STORE_LOCK
         self._catalog = Catalog(Place.of(self.path), read_only)
-        self._staging = RunStaging(self.path)
+        self._staging = RunStaging(self.path, report)
         self._recovery = Recovery(self.path, self._catalog)
 
     @classmethod
-    def open(cls, path: Path) -> Self:
+    def open(cls, path: Path, report: str | None = None) -> Self:
         """Open a store to write to: create it if there is none, and adopt what processes left in it.
 
         A new one has its catalog in a file, or on the server that `ensemble.store.sql_database` describes.
@@ -83,6 +85,8 @@ class Store(AbstractContextManager["Store"]):
         ----------
         path : Path
             The directory.
+        report : str, optional
+            Name of the report that the runs of this process are made for.
 
         Returns
         -------
@@ -100,7 +104,7 @@ class Store(AbstractContextManager["Store"]):
             require_writable(path)
             require_catalog(path)
             (path / STAGING).mkdir(exist_ok=True)  # a copy may lack it
-            store = cls(path)
+            store = cls(path, report=report)
             store._catalog.require_writable()
             for line in store.recover():
                 _log.warning("store: %s", line)

@@ -25,7 +25,7 @@ export async function showBoundaries({ content, parameters, query, signal }) {
   boundaries.sort((first, second) => second.updated.localeCompare(first.updated));
   const key = parameters.key ?? boundaries[0]?.study_key;
   if (key === undefined) {
-    const { items } = await get("/runs?limit=1", signal);
+    const { items } = await get("/runs?limit=1&reports=true", signal);
     content.replaceChildren(...invitation(items.length > 0));
     return;
   }

@@ -9,7 +9,7 @@ import { alertAbout } from "../problems.js";
 import { goTo } from "../router.js";
 import { describe } from "../symbols.js";
 
-const COLUMNS = ["Outcome", "Scene", "Time", "Made", ""];
+const COLUMNS = ["Outcome", "Scene", "Integrator", "Points", "Time", "Made", ""];
 
 /** @param {import("../router.js").Place} place */
 export async function showRuns({ content, query, signal }) {
@@ -36,13 +36,15 @@ export async function showRuns({ content, query, signal }) {
   );
 
   const where = query.getAll("where").map((condition) => ["where", condition]);
-  let next = `/runs?${new URLSearchParams([...where, ["limit", "50"]])}`;
+  const reports = query.has("reports") ? [["reports", "true"]] : [];
+  let next = `/runs?${new URLSearchParams([...where, ...reports, ["limit", "50"]])}`;
   const load = async () => {
     const page = await get(next, signal);
     rows.append(...page.items.map(row));
     next = page.next;
     more.hidden = next === null;
-    if (rows.rows.length === 0 && where.length === 0) {
+    const isAll = where.length + reports.length === 0;
+    if (rows.rows.length === 0 && isAll && (await get("/runs?limit=1&reports=true", signal)).items.length === 0) {
       const start = submitButton("Simulate a doublet in shear", async () => ({ preset: "doublet-shear" }));
       count.replaceWith(element("p", { class: "lead" }, "Nothing is stored yet."), element("p", {}, start));
     } else {
@@ -54,10 +56,12 @@ export async function showRuns({ content, query, signal }) {
 }
 
 /** @param {any} run */
-function row({ key, outcome, scene, time, created }) {
+function row({ key, outcome, scene, time, created, work, report }) {
   return tableRow(COLUMNS, [
     outcomeLabel(outcome),
-    describe(scene),
+    report ? [describe(scene), element("span", { class: "note" }, `, for the report ${report}`)] : describe(scene),
+    scene.numerics.integrator,
+    number(work.points),
     number(time),
     dateAndTime(created),
     element("a", { href: `#/runs/${key}` }, "Play"),
@@ -86,6 +90,8 @@ function filters(query) {
     spellcheck: "false",
   });
 
+  const reports = element("input", { id: "reports", type: "checkbox", checked: query.has("reports") });
+
   /** @param {SubmitEvent} event */
   const apply = (event) => {
     event.preventDefault();
@@ -96,7 +102,8 @@ function filters(query) {
     if (outcome.value) {
       wanted.push(`outcome=${outcome.value}`);
     }
-    goTo(`/runs?${new URLSearchParams(wanted.map((condition) => ["where", condition]))}`);
+    const where = wanted.map((condition) => ["where", condition]);
+    goTo(`/runs?${new URLSearchParams([...where, ...(reports.checked ? [["reports", ""]] : [])])}`);
   };
   return element(
     "form",
@@ -105,6 +112,7 @@ function filters(query) {
     outcome,
     element("label", { for: "conditions" }, "Conditions"),
     conditions,
+    element("label", { for: "reports" }, reports, " also those of reports"),
     element("button", {}, "Filter"),
   );
 }

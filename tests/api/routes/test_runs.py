@@ -34,6 +34,14 @@ def bound_run(filled_store: Path, reading: httpx2.Client) -> str:
         return store.summaries(["flow.rate=0.75"])[0].key
 
 
+def test_runs_of_reports_are_listed_if_asked_for(tmp_path):
+    with Store.open(tmp_path / "store", report="paper") as store, client_of(store.path) as client:
+        store.save(shear_run())
+        assert found(client) == []
+        assert [run["report"] for run in found(client, reports=True)] == ["paper"]
+        assert found(client, where="report=paper") == found(client, reports=True)
+
+
 def test_a_run_is_given_as_a_figure(reading, bound_run):
     answer = reading.get(f"/runs/{bound_run}/file?format=png")
     assert answer.headers["content-type"] == "image/png"

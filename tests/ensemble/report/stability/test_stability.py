@@ -176,6 +176,8 @@ def test_the_command_writes_a_report_into_the_store_and_resumes(ensemble, tmp_pa
     assert again.stderr == ""
     assert json.loads(again.stdout) == json.loads(first.stdout)
     assert ensemble("check", "--store", str(tmp_path / "store")).returncode == 0
+    with Store.existing(tmp_path / "store") as store:
+        assert {run.report for run in store.summaries()} == {"stability"}
 
 
 def test_bad_input_is_refused(ensemble, tmp_path):
