@@ -34,6 +34,7 @@ _ORDERS = 1  # tag of messages to workers
 _REPORTS = 2  # tag of messages to the dispatcher
 _POLL_SECONDS = 0.002
 _PUBLISH_SECONDS = 0.5
+_PUBLISH_SHARE = 0.01  # of this thread's time that it takes at most; a boundary may have a thousand points
 
 
 @dataclass(frozen=True)
@@ -208,8 +209,8 @@ class Dispatcher(Generic[SomeTask]):
     store : Store
         Where runs are committed.
     on_change : callable
-        Called with the progress when outcomes or assignments have changed something, at most twice a second,
-        and at the end.
+        Called with the progress when outcomes or assignments have changed something, at most twice a second
+        and for a hundredth of the time, and at the end.
     meter : UsageMeter
         Measures what the groups do.
     requests : EndRequests
@@ -250,7 +251,10 @@ class Dispatcher(Generic[SomeTask]):
             What it took; None if the job was asked to end, and runs are left to be made.
         """
         while len(self._idle) < self._communicator.Get_size() or not (self._queue.done or self._ends):
-            for report, rank in self._reports():
+            reports = list(self._reports())
+            if staged := [report.staged for report, _ in reports if isinstance(report, Finished)]:
+                self._store.commit_all(staged)
+            for report, rank in reports:
                 self._take(report, rank)
             self._suspend_if_asked()
             self._cancel_unneeded()
@@ -291,14 +295,15 @@ class Dispatcher(Generic[SomeTask]):
 
     def _publish(self) -> None:
         self._changed = False
+        begin = time.thread_time()
         self._on_change(self._progress())
-        self._next_publication = time.monotonic() + _PUBLISH_SECONDS
+        worked = time.thread_time() - begin
+        self._next_publication = time.monotonic() + max(_PUBLISH_SECONDS, worked / _PUBLISH_SHARE)
 
     def _take(self, report: WorkerReport, rank: int) -> None:
         match report:
-            case Finished(staged, answer, seconds):
+            case Finished(_, answer, seconds):
                 task = self._end(rank)
-                self._store.commit(staged)
                 self._queue.answer(task, answer)
                 self._runs += 1
                 self._meter.record_run(rank, seconds)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 from sqlalchemy import Executable, Select, Text, bindparam, cast, delete, func, insert, or_, select, tuple_
@@ -90,20 +90,23 @@ class Catalog:
         """Close all connections."""
         self._engine.dispose()
 
-    def insert(self, summary: RunSummary) -> None:
-        """Add a run; it exists from the moment that this returns.
+    def insert(self, summaries: Iterable[RunSummary]) -> None:
+        """Add runs; they exist from the moment that this returns, or none does.
 
         Parameters
         ----------
-        summary : RunSummary
+        summaries : iterable of RunSummary
         """
-        row = {
-            "key": summary.key,
-            "created": timestamp_text(summary.created),
-            "document": summary.document(),
-        }
+        rows = [
+            {
+                "key": summary.key,
+                "created": timestamp_text(summary.created),
+                "document": summary.document(),
+            }
+            for summary in summaries
+        ]
         with transaction(self._engine) as connection:
-            connection.execute(insert(RunRow), row)
+            connection.execute(insert(RunRow), rows)
 
     def keys(self) -> set[str]:
         """Return the keys of all runs."""

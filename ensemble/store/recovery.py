@@ -132,7 +132,7 @@ class Recovery:
         except StoreError as error:
             done.append(f"{error}; moved to {self.set_aside(directory)}")
             return False
-        self._catalog.insert(summary)
+        self._catalog.insert([summary])
         return True
 
     def _adopt_staged(self, directory: Path, committed: set[str]) -> bool:
@@ -145,7 +145,7 @@ class Recovery:
             return False
         os.rename(directory, self._runs / summary.key)
         flush(self._runs)
-        self._catalog.insert(summary)
+        self._catalog.insert([summary])
         committed.add(summary.key)
         return True
 

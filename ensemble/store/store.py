@@ -204,10 +204,7 @@ class Store(AbstractContextManager["Store"]):
         return self._staging.checkpoint(scene)
 
     def commit(self, staged: Staged) -> str:
-        """Commit a staged run: from then on it exists, and its checkpoint is removed.
-
-        If the key exists already, that run stays and the staged copy is removed.  While the database or the
-        disk does not answer the commit is tried again for `ensemble.store.staging.DISK_SECONDS`.
+        """Commit a staged run; see `commit_all`.
 
         Parameters
         ----------
@@ -222,33 +219,61 @@ class Store(AbstractContextManager["Store"]):
         Raises
         ------
         StoreError
-            If the run could not be committed.  It stays where it is and the next process that opens the store
-            to write adopts it.
+            If the run could not be committed.
+        """
+        self.commit_all([staged])
+        return staged.key
+
+    def commit_all(self, staged: Sequence[Staged]) -> None:
+        """Commit staged runs: from then on they exist, and their checkpoints are removed.
+
+        Together they take hardly longer than one, which waits for the disk most of the time.  If a key exists
+        already, that run stays and the staged copy is removed.  While the database or the disk does not
+        answer the commit is tried again for `ensemble.store.staging.DISK_SECONDS`.
+
+        Parameters
+        ----------
+        staged : sequence of Staged
+            From `stage`, of this process or other ones.
+
+        Raises
+        ------
+        StoreError
+            If the runs could not be committed.  They stay where they are and the next process that opens the
+            store to write adopts them.
         """
         try:
-            return patiently(OSError, *UNUSABLE)(self._commit_once, staged)
+            patiently(OSError, *UNUSABLE)(self._commit_once, staged)
         except (OSError, *UNUSABLE) as error:
+            keys = ", ".join(each.key for each in staged)
             raise StoreError(
-                f"run {staged.key}: it could not be committed ({reason(error)}); it is kept in {self.path} "
+                f"run {keys}: it could not be committed ({reason(error)}); it is kept in {self.path} "
                 "and the next command that writes there adopts it"
             ) from error
 
-    def _commit_once(self, staged: Staged) -> str:
-        destination = self._runs / staged.key
+    def _commit_once(self, staged: Sequence[Staged]) -> None:
         with locked(self._lock):
-            if self.contains(staged.key):
-                shutil.rmtree(staged.directory, ignore_errors=True)
-                remove_checkpoint(self.path, staged.key)
-                return staged.key
-            if staged.directory.exists():  # else an earlier attempt has moved it
-                if destination.exists():
-                    # Of a process that died between the rename and the catalog; damaged perhaps.
-                    self._recovery.set_aside(destination)
-                os.rename(staged.directory, destination)
+            new: dict[str, Staged] = {}
+            for each in staged:
+                if each.key in new or self.contains(each.key):
+                    shutil.rmtree(each.directory, ignore_errors=True)
+                else:
+                    new[each.key] = each
+                    self._put_in_place(each)
+            if new:
                 flush(self._runs)
-            self._catalog.insert(staged.summary)
-            remove_checkpoint(self.path, staged.key)
-        return staged.key
+                self._catalog.insert(each.summary for each in new.values())
+            for each in staged:
+                remove_checkpoint(self.path, each.key)
+
+    def _put_in_place(self, staged: Staged) -> None:
+        if not staged.directory.exists():  # an earlier attempt has moved it
+            return
+        destination = self._runs / staged.key
+        if destination.exists():
+            # Of a process that died between the rename and the catalog; damaged perhaps.
+            self._recovery.set_aside(destination)
+        os.rename(staged.directory, destination)
 
     def save(self, run: Run, summary: RunSummary | None = None) -> str:
         """Stage and commit a run.

@@ -82,7 +82,7 @@ class BoundaryStore:
     def __init__(self, store: Store) -> None:
         self.save_boundary = store.save_boundary
 
-    def commit(self, staged: Any) -> None:
+    def commit_all(self, staged: Any) -> None:
         pass
 
 

@@ -15,7 +15,7 @@ import json
 import pickle
 import tempfile
 import time
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from heapq import heappop, heappush
 from itertools import count
 from pathlib import Path
@@ -53,6 +53,9 @@ class SimulatedTime:
     def worked(self) -> float:
         """Seconds in which the coordinator has worked."""
         return time.thread_time() - self._begin + self.charged
+
+    def thread_time(self) -> float:
+        return self.worked
 
     def monotonic(self) -> float:
         return self.worked + self.slept
@@ -119,16 +122,26 @@ class SimulatedGroups:
         return number
 
 
-class CommittingStore:
-    """A store that keeps boundaries in a real catalog, and charges the commit of a run without making it."""
+@dataclass(frozen=True)
+class CommitCosts:
+    """Seconds that the commit of runs takes."""
 
-    def __init__(self, store: Store, clock: SimulatedTime, commit_seconds: float) -> None:
+    one: float
+    more: float  # each further one that is committed with it
+    working: float  # processor time of the first
+
+
+class CommittingStore:
+    """A store that keeps boundaries in a real catalog, and charges the commit of runs without making it."""
+
+    def __init__(self, store: Store, clock: SimulatedTime, costs: CommitCosts) -> None:
         self.save_boundary = store.save_boundary
         self._clock = clock
-        self._commit_seconds = commit_seconds
+        self._costs = costs
 
-    def commit(self, staged: Any) -> None:
-        self._clock.charged += self._commit_seconds
+    def commit_all(self, staged: Any) -> None:
+        self._clock.charged += self._costs.working + self._costs.more * (len(staged) - 1)
+        self._clock.sleep(self._costs.one - self._costs.working)  # the disk works
 
 
 def message_seconds() -> float:
@@ -145,17 +158,22 @@ def message_seconds() -> float:
     return (time.perf_counter() - begin) / MESSAGES
 
 
-def commit_seconds() -> float:
-    """Measure what the commit of a run takes, files included."""
+def commit_costs() -> CommitCosts:
+    """Measure what the commit of runs takes, one by one and together, files included."""
     with tempfile.TemporaryDirectory() as place, Store.open(Path(place)) as store:
-        staged = [store.stage(shear_run(shear_scene(rate=0.5 + 0.001 * each))) for each in range(COMMITS)]
-        begin = time.perf_counter()
-        for one in staged:
-            store.commit(one)
-        return (time.perf_counter() - begin) / COMMITS
+        staged = [store.stage(shear_run(shear_scene(rate=0.5 + 0.001 * each))) for each in range(2 * COMMITS)]
+        begin, worked = time.perf_counter(), time.thread_time()
+        for each in staged[:COMMITS]:
+            store.commit(each)
+        between, working = time.perf_counter(), time.thread_time() - worked
+        store.commit_all(staged[COMMITS:])
+        one = (between - begin) / COMMITS
+        return CommitCosts(one, (time.perf_counter() - between - one) / (COMMITS - 1), working / COMMITS)
 
 
-def replay(points: int, groups: int, durations: list[float], costs: tuple[float, float]) -> dict[str, Any]:
+def replay(
+    points: int, groups: int, durations: list[float], costs: tuple[float, CommitCosts]
+) -> dict[str, Any]:
     """Trace a study on simulated groups and return the figures."""
     message, commit = costs
     rates = [0.25 + 1.25 * index / points for index in range(points)]
@@ -196,8 +214,8 @@ def main() -> None:
     options = parser.parse_args()
     with Store.existing(options.store) as store:
         recorded = [summary.work.wall_seconds for summary in store.summaries()]
-    costs = message_seconds(), commit_seconds()
-    print(json.dumps({"seconds of a message": costs[0], "seconds of a commit": costs[1]}))
+    costs = message_seconds(), commit_costs()
+    print(json.dumps({"seconds of a message": costs[0], "seconds of a commit": asdict(costs[1])}))
     for groups in options.groups:
         for times in options.times:
             points = max(1, round(groups * options.points_per_group))

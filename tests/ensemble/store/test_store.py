@@ -316,6 +316,19 @@ def test_second_commit_of_a_key_keeps_the_first_run(store: Store) -> None:
     assert store.check() == []
 
 
+def test_runs_committed_together_are_those_committed_one_by_one(store: Store) -> None:
+    old = shear_run(shear_scene(0.5), seed=1)
+    store.save(old)
+    new = [shear_run(shear_scene(rate), seed=2) for rate in (0.5, 1.0, 1.5, 1.5)]
+    staged = [store.stage(run) for run in new]
+    store.commit_all(staged)
+    assert {summary.key for summary in store.summaries()} == {each.key for each in staged}
+    assert_same_run(store.load(staged[0].key), old)
+    assert_same_run(store.load(staged[3].key), new[3])
+    assert not any(each.directory.exists() for each in staged)
+    assert store.check() == []
+
+
 # Opening
 
 
