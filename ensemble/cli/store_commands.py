@@ -24,6 +24,8 @@ from ensemble.cli.options import (
 )
 from ensemble.cli.printing import print_json, print_json_array, print_list, print_table
 from ensemble.config.defaults import DEFAULT_STORE, LISTED
+from ensemble.config.figure_options import FigureOptions, parse_size
+from ensemble.config.validation import validated
 from ensemble.errors import refusing
 
 if TYPE_CHECKING:
@@ -106,17 +108,28 @@ def show(  # numpydoc ignore=PR01
             metavar="FILE", help="Draw it to this file: .png, .svg or .pdf, or a run's movie: .mp4 or .gif."
         ),
     ] = None,
+    size: Annotated[
+        str | None,
+        typer.Option(metavar="WxH", help="Width and height of a figure in centimeters, such as 8.6x6."),
+    ] = None,
+    dpi: Annotated[int, typer.Option(help="Points of a .png on an inch, from 30 to 1200.")] = 300,
+    svg_text: Annotated[
+        bool, typer.Option("--svg-text", help="Keep letters in an .svg as text instead of curves.")
+    ] = False,
     units: UnitsOf = None,
     store: StorePath = DEFAULT_STORE,
     as_json: AsJson = False,
 ) -> None:
     """Print a run, a boundary or a branch of steady states, or draw it to a file."""
     with refusing(), _existing(store) as opened:
+        options = validated(
+            FigureOptions, {"size": size and parse_size(size), "dpi": dpi, "svg_text": svg_text}
+        )
         answer = _stored(opened, name)
         if units is not None:
             answer = answer.in_units(_units_of(units))
         if output is not None:
-            answer.draw(output)
+            answer.draw(output, options)
         elif as_json:
             print_json(answer.json_document())
         else:

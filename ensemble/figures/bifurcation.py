@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ensemble.figures.style import BLACK, MARKS, STYLE, VERMILLION, WIDTH
-from ensemble.figures.symbols import axis_label, describe, with_unit
+from ensemble.figures.symbols import axis_label, describe, number_text, with_unit
 from ensemble.search.branch_summary import BranchPointRecord, BranchSummary
 from solver.analysis.run import Outcome
 from solver.dimensions import ENERGY_PER_DEPTH, LENGTH, RATE, Dimension
@@ -136,6 +136,6 @@ def _draw_special(axes: Axes, branch: BranchSummary, measured: Measured) -> None
                 markerfacecolor="white",
                 markeredgewidth=1.3,
                 zorder=4,
-                label=f"{name}, {point.value:.8g}",
+                label=f"{name}, {number_text(point.value, 8)}",
                 gid=name,
             )

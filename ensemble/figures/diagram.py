@@ -11,15 +11,19 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from ensemble.figures.style import BLACK, GRAY, MARKS, STYLE, VERMILLION, WIDTH
-from ensemble.figures.symbols import Quantity, axis_label, describe, quantity
+from ensemble.figures.symbols import Quantity, axis_label, describe, number_text, quantity
 from ensemble.search.boundary import Boundary, BoundaryPoint
 from ensemble.search.critical_value import SearchStatus
 from ensemble.search.line import Line, line_through
 from solver.analysis.run import Array, Outcome
 
+_NARROW = 5.0  # inches
+
 
 @matplotlib.rc_context(STYLE)
-def phase_diagram(boundary: Boundary, runs: Sequence[tuple[float, float, Outcome]]) -> Figure:
+def phase_diagram(
+    boundary: Boundary, runs: Sequence[tuple[float, float, Outcome]], width: float = WIDTH
+) -> Figure:
     """Draw the runs and the boundary of a study in the plane of its two parameters.
 
     Parameters
@@ -28,6 +32,8 @@ def phase_diagram(boundary: Boundary, runs: Sequence[tuple[float, float, Outcome
         Its swept parameter is drawn along x, its searched parameter along y.
     runs : sequence of (float, float, Outcome)
         Swept value, searched value and outcome of each run.
+    width : float
+        Inches.  The legend of a narrow figure stands below it.
 
     Returns
     -------
@@ -40,9 +46,9 @@ def phase_diagram(boundary: Boundary, runs: Sequence[tuple[float, float, Outcome
     scene = boundary.scene
     x, y = quantity(swept, scene.flow), quantity(searched, scene.flow)
 
-    figure = Figure(figsize=(WIDTH, 4.0), layout="constrained")
+    figure = Figure(figsize=(width, 4.0), layout="constrained")
     axes = figure.add_subplot(xlabel=axis_label(swept, scene), ylabel=axis_label(searched, scene))
-    axes.set_title(describe(scene, without=(swept, searched)), pad=10)
+    axes.set_title(describe(scene, without=(swept, searched)), pad=10, wrap=True)
     _draw_runs(axes, runs)
     points = sorted(boundary.points, key=lambda point: point.parameters[swept])
     bracketed = [point for point in points if point.critical_value is not None]
@@ -55,7 +61,10 @@ def phase_diagram(boundary: Boundary, runs: Sequence[tuple[float, float, Outcome
         _draw_fit(axes, line, [point.parameters[swept] for point in converged], x, y)
     axes.margins(0.06)
     if axes.get_legend_handles_labels()[0]:
-        figure.legend(loc="outside right center")
+        if width < _NARROW:
+            figure.legend(loc="outside lower center", ncols=2)
+        else:
+            figure.legend(loc="outside right center")
     return figure
 
 
@@ -126,6 +135,7 @@ def _draw_boundary(axes: Axes, bracketed: Sequence[BoundaryPoint], swept: str, y
 
 def _draw_fit(axes: Axes, line: Line, sweep: Sequence[float], x: Quantity, y: Quantity) -> None:
     sign = "−" if line.intercept < 0 else "+"
+    slope, intercept = number_text(line.slope, 3), number_text(abs(line.intercept), 2)
     ends = np.array([min(sweep), max(sweep)])
     axes.plot(
         ends,
@@ -133,7 +143,7 @@ def _draw_fit(axes: Axes, line: Line, sweep: Sequence[float], x: Quantity, y: Qu
         color=BLACK,
         linestyle=(0, (4, 3)),
         zorder=1.6,
-        label=f"fit, ${y.critical}$ = {line.slope:.3g} ${x.symbol}$ {sign} {abs(line.intercept):.2g}",
+        label=f"fit, ${y.critical}$ = {slope} ${x.symbol}$ {sign} {intercept}",
         gid="fit",
     )
 

@@ -10,6 +10,7 @@ from typing import Final
 import matplotlib
 from matplotlib.figure import Figure
 
+from ensemble.config.figure_options import INCH, USUAL, FigureOptions
 from ensemble.disk import replacing
 from ensemble.figures.style import STYLE
 
@@ -19,7 +20,7 @@ _UNDATED = {".png": {}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
 FIGURE_SUFFIXES: Final = tuple(_UNDATED)
 
 
-def save(figure: Figure, path: Path) -> None:
+def save(figure: Figure, path: Path, options: FigureOptions = USUAL) -> None:
     """Write a figure in the format that the file's suffix names.
 
     The file appears complete or not at all, replacing an earlier one, and equal figures give equal bytes.
@@ -29,6 +30,8 @@ def save(figure: Figure, path: Path) -> None:
     figure : Figure
     path : Path
         Its suffix is ``.png``, ``.svg`` or ``.pdf``.
+    options : FigureOptions
+        Its size is given to the figure.
 
     Raises
     ------
@@ -37,8 +40,12 @@ def save(figure: Figure, path: Path) -> None:
     """
     suffix = suffix_among(path, FIGURE_SUFFIXES)
     image = BytesIO()  # a disk may take only a part, which not every format can end
+    if options.size is not None:
+        width, height = options.size
+        figure.set_size_inches((width / INCH, height / INCH))
     with matplotlib.rc_context(STYLE):
-        figure.savefig(image, format=suffix[1:], metadata=_UNDATED[suffix])
+        matplotlib.rcParams["svg.fonttype"] = "none" if options.svg_text else "path"
+        figure.savefig(image, format=suffix[1:], dpi=options.dpi, metadata=_UNDATED[suffix])
     with replacing(path) as unfinished:
         unfinished.write_bytes(image.getbuffer())
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from ensemble.config.figure_options import USUAL, FigureOptions
 from ensemble.figures.figure_files import FIGURE_SUFFIXES, save, suffix_among
 from ensemble.figures.history import run_figure
 from solver.analysis.run import Run
 
 
-def draw_run(run: Run, output: Path) -> None:
+def draw_run(run: Run, output: Path, options: FigureOptions) -> None:
     """Draw what happened in a run, or its movie.
 
     Parameters
@@ -17,15 +18,19 @@ def draw_run(run: Run, output: Path) -> None:
     run : Run
     output : Path
         Its suffix names the format.
+    options : FigureOptions
+        Of a figure.
 
     Raises
     ------
     ValueError
-        If there is no such format.
+        If there is no such format, or the options are for a figure and this is a movie.
     """
     from ensemble.figures.movie import MOVIE_SUFFIXES, save_movie
 
     if suffix_among(output, (*FIGURE_SUFFIXES, *MOVIE_SUFFIXES)) in MOVIE_SUFFIXES:
+        if options != USUAL:
+            raise ValueError(f"output: a movie has no size, dpi or svg-text, got {output.name!r}")
         save_movie(run, output)
     else:
-        save(run_figure(run), output)
+        save(run_figure(run), output, options)

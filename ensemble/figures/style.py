@@ -48,7 +48,6 @@ STYLE: Final = matplotlib.RcParams(
         "axes.spines.right": False,
         "lines.linewidth": 1.2,
         "legend.frameon": False,
-        "savefig.dpi": 300,
         "pdf.fonttype": 42,
         "svg.hashsalt": "vesicle-ensemble",
     }

@@ -172,5 +172,21 @@ def _in_units(path: str, numbers: list[float], scene: Scene) -> str:
 def _numbers(values: list[float]) -> str:
     """Return all of a few numbers, or the smallest and largest of many."""
     if len(values) > _MOST_NUMBERS:
-        return f"{values[0]:.3g} to {values[-1]:.3g}"
-    return " and ".join(f"{number:g}" for number in values)
+        return f"{number_text(values[0], 3)} to {number_text(values[-1], 3)}"
+    return " and ".join(map(number_text, values))
+
+
+def number_text(value: float, digits: int = 6) -> str:
+    """Write a number in text of a figure, with a true minus sign.
+
+    Parameters
+    ----------
+    value : float
+    digits : int
+        Significant ones, at most.
+
+    Returns
+    -------
+    str
+    """
+    return f"{value:.{digits}g}".replace("-", "−")

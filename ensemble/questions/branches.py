@@ -26,6 +26,7 @@ from solver.scene import LARGEST_DENSE, Scene, Units
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from ensemble.config.figure_options import FigureOptions
     from ensemble.search.branch_summary import BranchSummary
     from ensemble.store import Store
     from ensemble.store.listing import Listing
@@ -385,12 +386,12 @@ class _StoredBranch(StoredAnswer):
 
         return branch_table(self.summary)
 
-    def draw(self, output: Path) -> None:
+    def draw(self, output: Path, options: FigureOptions) -> None:
         """Draw the bifurcation diagram."""
         from ensemble.figures import save
         from ensemble.figures.bifurcation import bifurcation_diagram
 
-        save(bifurcation_diagram([self.summary]), output)
+        save(bifurcation_diagram([self.summary]), output, options)
 
 
 class StoredBranches:

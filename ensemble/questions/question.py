@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
+    from ensemble.config.figure_options import FigureOptions
     from ensemble.display.progress import Display
     from ensemble.store import Store
     from ensemble.store.columns import ListColumn
@@ -113,13 +114,15 @@ class StoredAnswer(ABC):
         """
 
     @abstractmethod
-    def draw(self, output: Path) -> None:
+    def draw(self, output: Path, options: FigureOptions) -> None:
         """Draw the answer to a file.
 
         Parameters
         ----------
         output : Path
             Its suffix names the format.
+        options : FigureOptions
+            Of a figure.
 
         Raises
         ------

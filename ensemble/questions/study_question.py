@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
+    from ensemble.config.figure_options import FigureOptions
     from ensemble.display.progress import Display
     from ensemble.mpi.run_study import Snapshot, StudyResult
     from ensemble.search.boundary import Boundary
@@ -313,11 +314,13 @@ class _StoredBoundary(StoredAnswer):
 
         return boundary_table(self.boundary)
 
-    def draw(self, output: Path) -> None:
+    def draw(self, output: Path, options: FigureOptions) -> None:
         """Draw the phase diagram, with every run that is behind the boundary."""
         from ensemble.config.dotted_paths import parameter_value
+        from ensemble.config.figure_options import INCH
         from ensemble.figures import phase_diagram, save
         from ensemble.figures.movie import MOVIE_SUFFIXES
+        from ensemble.figures.style import WIDTH
 
         if output.suffix.lower() in MOVIE_SUFFIXES:
             raise ValueError(
@@ -330,4 +333,5 @@ class _StoredBoundary(StoredAnswer):
             for key in point.runs:
                 summary = self.store.summary(key)
                 runs.append((at, parameter_value(summary.scene, searched), summary.outcome))
-        save(phase_diagram(self.boundary, runs), output)
+        width = WIDTH if options.size is None else options.size[0] / INCH
+        save(phase_diagram(self.boundary, runs, width), output, options)

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import os
+import struct
 import subprocess
 import sys
 from pathlib import Path
+from xml.etree import ElementTree
 
 import matplotlib
 import pytest
 from matplotlib.figure import Figure
 
+from ensemble.config.figure_options import FigureOptions
 from ensemble.figures import run_figure, save
+from ensemble.figures.symbols import number_text
 from tests.ensemble.made_runs import orbit
 
 FIRST_BYTES = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}
@@ -28,6 +32,41 @@ def test_equal_figures_are_equal_undated_files(tmp_path: Path, suffix: str) -> N
     assert b"CreationDate" not in one.read_bytes()
     assert b"dc:date" not in one.read_bytes()
     assert {path.name for path in tmp_path.iterdir()} == {one.name, other.name}
+
+
+def test_letters_of_an_svg_may_be_text_and_a_figure_has_the_size_that_is_asked_for(tmp_path: Path) -> None:
+    options = FigureOptions(size=(2.54 * 5, 2.54 * 4), svg_text=True)
+    save(run_figure(orbit()), tmp_path / "run.svg", options)
+    text = (tmp_path / "run.svg").read_text()
+    root = ElementTree.fromstring(text)
+    assert (root.get("width"), root.get("height")) == ("360pt", "288pt")
+    words = {"".join(each.itertext()).strip() for each in root.iter("{http://www.w3.org/2000/svg}text")}
+    assert "gap" in words
+    save(run_figure(orbit()), tmp_path / "curves.svg")
+    assert "<text" not in (tmp_path / "curves.svg").read_text()
+    save(run_figure(orbit()), tmp_path / "run.png", FigureOptions(size=(2.54 * 5, 2.54 * 4), dpi=50))
+    width, height = struct.unpack(">II", (tmp_path / "run.png").read_bytes()[16:24])
+    assert (width, height) == (250, 200)
+
+
+def test_numbers_in_figures_have_true_minus_signs() -> None:
+    assert number_text(-0.25) == "−0.25"
+    assert number_text(-2.5e-7, 2) == "−2.5e−07"
+
+
+@pytest.mark.parametrize(
+    ("option", "named"),
+    [
+        ("--size=8.6", "size: '8.6' — must be width x height in centimeters"),
+        ("--size=8.6x1", "size.1: 1.0"),
+        ("--dpi=3", "dpi: 3"),
+    ],
+)
+def test_other_sizes_are_refused_by_name(ensemble, finished_study, option: str, named: str) -> None:
+    store = f"--store={finished_study.store}"
+    refused = ensemble("show", "critical-hamaker", "--output=figure.svg", option, store)
+    assert refused.returncode == 2
+    assert named in refused.stderr
 
 
 def test_other_suffixes_are_refused_by_name(tmp_path: Path) -> None:

@@ -198,3 +198,14 @@ def test_many_different_numbers_are_given_by_their_ends() -> None:
     assert "= 0.7 to 0.9" in words
     assert "0.75" not in words
     assert "0.7 and 0.75 and 0.8" in describe(Scene(horizon=1.0, vesicles=vesicles[:3]))
+
+
+def test_the_legend_of_a_narrow_figure_stands_below_it() -> None:
+    points = boundary([point(0.5, 0.36), point(1.0, 0.7)])
+    for width, is_below in ((7.2, False), (3.4, True)):
+        figure = phase_diagram(points, [], width)
+        figure.draw_without_rendering()
+        (axes,), (legend,) = figure.axes, figure.legends
+        box = legend.get_window_extent()
+        assert (box.y1 < axes.get_window_extent().y0) == is_below
+        assert (box.x0 > axes.get_window_extent().x1) == (not is_below)

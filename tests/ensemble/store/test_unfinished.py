@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ensemble.config.figure_options import USUAL
 from ensemble.errors import StoreError, StoreInputError
 from ensemble.questions import kinds
 from ensemble.store import RunStaging, Store
@@ -73,7 +74,7 @@ def test_a_start_that_relaxes_has_nothing_to_show(staging: RunStaging, tmp_path:
     assert answer.json_document()["time"] is None
     assert answer.json_document()["last"] == {}
     with pytest.raises(ValueError, match="its start relaxes"):
-        answer.draw(tmp_path / "run.png")
+        answer.draw(tmp_path / "run.png", USUAL)
 
 
 def test_its_figure_is_that_of_a_run(staging: RunStaging, tmp_path: Path) -> None:
