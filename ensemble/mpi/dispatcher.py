@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from heapq import heappop, heappush
-from typing import TYPE_CHECKING, Any, Generic, cast
+from typing import TYPE_CHECKING, Any, Generic, Protocol, cast
 
 from ensemble.mpi.groups import Groups
 from ensemble.mpi.usage import RunUsage, UsageMeter
@@ -197,6 +197,24 @@ def _simulate(groups: Groups, leaders: Intracomm, store: StoreOnRank, task: Task
     return Finished(store.stage_recorded(run, keeper.record), RunAnswer(run.outcome, run.sensitive), seconds)
 
 
+class Clock(Protocol):
+    """What the dispatcher knows of time; see the module `time`."""
+
+    def monotonic(self) -> float:
+        """Return the time, in seconds."""
+
+    def thread_time(self) -> float:
+        """Return for how long the processor has worked for this thread."""
+
+    def sleep(self, seconds: float, /) -> None:
+        """Wait.
+
+        Parameters
+        ----------
+        seconds : float
+        """
+
+
 class Dispatcher(Generic[SomeTask]):
     """Answers reports with orders until the queue needs no further run.
 
@@ -215,6 +233,8 @@ class Dispatcher(Generic[SomeTask]):
         Measures what the groups do.
     requests : EndRequests
         Whether the job is asked to end.
+    clock : Clock
+        By which it waits, and measures its own work.
     """
 
     def __init__(
@@ -225,7 +245,9 @@ class Dispatcher(Generic[SomeTask]):
         on_change: Callable[[JobProgress[SomeTask]], None],
         meter: UsageMeter,
         requests: EndRequests,
+        clock: Clock = time,
     ) -> None:
+        self._clock = clock
         self._communicator = communicator
         self._queue = queue
         self._store = store
@@ -275,7 +297,7 @@ class Dispatcher(Generic[SomeTask]):
         while (received := _receive(self._communicator, _REPORTS)) is None:
             self._suspend_if_asked()
             self._publish_if_due()
-            time.sleep(_POLL_SECONDS)
+            self._clock.sleep(_POLL_SECONDS)
         # Not more than one of each group: while reports keep coming the groups must get orders, too.
         for _ in range(self._communicator.Get_size()):
             yield cast(tuple[WorkerReport, int], received)
@@ -290,15 +312,16 @@ class Dispatcher(Generic[SomeTask]):
                 self._order(Suspend(), rank)
 
     def _publish_if_due(self) -> None:
-        if self._changed and time.monotonic() >= self._next_publication:
+        if self._changed and self._clock.monotonic() >= self._next_publication:
             self._publish()
 
     def _publish(self) -> None:
         self._changed = False
-        begin = time.thread_time()
+        begin = self._clock.thread_time()
         self._on_change(self._progress())
-        worked = time.thread_time() - begin
-        self._next_publication = time.monotonic() + max(_PUBLISH_SECONDS, worked / _PUBLISH_SHARE)
+        worked = self._clock.thread_time() - begin
+        pause = max(_PUBLISH_SECONDS, worked / _PUBLISH_SHARE)
+        self._next_publication = self._clock.monotonic() + pause
 
     def _take(self, report: WorkerReport, rank: int) -> None:
         match report:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +18,7 @@ from ensemble.report.report_model import Machine
 from ensemble.report.scaling.scaling_document import (
     CollectiveTime,
     EvaluationCost,
+    GroupsUse,
     Scaling,
     SharedEvaluation,
     WeakScaling,
@@ -38,12 +40,14 @@ from ensemble.report.scaling.scaling_measurements import (
 )
 from ensemble.report.scaling.scaling_plan import FULL, POINTS, QUICK, ScalingPlan
 from ensemble.report.scaling.scaling_text import scaling_conclusions, scaling_text
+from ensemble.report.scaling.simulated_groups import FEWEST_RUNS, MeasuredCosts, simulate_groups
 from solver.scene import LARGEST_DENSE
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
 
     from ensemble.mpi.store_on_ranks import StoreOnRank
+    from ensemble.store import Store
 
 
 _ROUNDS = 3  # in which the numbers of ranks take turns, because a machine's speed changes within minutes
@@ -73,12 +77,15 @@ def make_scaling(
     FinishedReport or None
         The report on the first rank; None elsewhere.
     """
-    document = measure_scaling(communicator, QUICK if quick else FULL, log)
+    plan = QUICK if quick else FULL
+    document = measure_scaling(communicator, plan, log)
     if document is None:
         return None
+    directory = report_directory(whole_store(store).path, ReportName.SCALING)
+    groups = _simulate_groups(whole_store(store), plan, directory, log)
+    document = document.model_copy(update={"groups": groups})
     figures = scaling_figures(document)
     text = scaling_text(document, [f"{name}.png" for name in figures])
-    directory = report_directory(whole_store(store).path, ReportName.SCALING)
     report = FinishedReport(directory, document, text, scaling_conclusions(document))
     write_report(report, figures)
     return report
@@ -142,7 +149,23 @@ def measure_scaling(communicator: Intracomm, plan: ScalingPlan, log: Callable[[s
             for cost in costs
         ],
         crossover=crossover,
+        groups=[],
     )
+
+
+def _simulate_groups(
+    store: Store, plan: ScalingPlan, place: Path, log: Callable[[str], None]
+) -> list[GroupsUse]:
+    recorded = [summary.work.wall_seconds for summary in store.summaries()]
+    if len(recorded) < FEWEST_RUNS:
+        return []
+    place.mkdir(parents=True, exist_ok=True)
+    costs = MeasuredCosts.here(store, place)
+    uses = []
+    for groups, times in plan.groups:
+        log(f"{groups} groups in simulated time, runs {times:g} times as long as stored ones")
+        uses.append(simulate_groups(groups, [times * seconds for seconds in recorded], costs, place))
+    return uses
 
 
 def _log_nothing(line: str) -> None:

@@ -160,6 +160,37 @@ class SummationCrossover(ReportModel):
     assumption: str
 
 
+class GroupsUse(ReportModel):
+    """What groups of ranks and their dispatcher do while a boundary is traced, in simulated time.
+
+    Attributes
+    ----------
+    groups, points : int
+        Number of groups and of the boundary's points.
+    run_seconds : float
+        Mean time of a run.
+    runs : int
+        How many were made.
+    wall_seconds : float
+        Until the boundary was traced.
+    busy : float
+        Share of the time, until a group finds nothing to do, in which groups simulate; their mean.
+    dispatcher_share : float
+        Share of the time in which the dispatcher works, on a processor that it shares with rank 0.
+    dispatcher_seconds_a_run : float
+        Its work for each run.
+    """
+
+    groups: int
+    points: int
+    run_seconds: float
+    runs: int
+    wall_seconds: float
+    busy: float
+    dispatcher_share: float
+    dispatcher_seconds_a_run: float
+
+
 class Scaling(ReportModel):
     """The whole report.
 
@@ -193,6 +224,8 @@ class Scaling(ReportModel):
         By number of vesicles.
     crossover : SummationCrossover
         Where a fast multipole method would be faster.
+    groups : list of GroupsUse
+        By number of groups; empty if the store has too few runs to take their times from.
     """
 
     report: str = "scaling"
@@ -209,3 +242,4 @@ class Scaling(ReportModel):
     recommendations: list[RankRecommendation]
     costs: list[EvaluationCost]
     crossover: SummationCrossover
+    groups: list[GroupsUse]

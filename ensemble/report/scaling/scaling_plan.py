@@ -24,17 +24,30 @@ class ScalingPlan:
         Measured on one rank, and √G times as many on G ranks, so that each rank has the same pairs.
     repeats : int
         How often each evaluation is repeated.
+    groups : tuple of (int, float)
+        Numbers of groups of ranks that are simulated, and how many times as long as stored runs theirs take.
     """
 
     shared: tuple[int, ...]
     single: tuple[int, ...]
     weak: int
     repeats: int
+    groups: tuple[tuple[int, float], ...] = ()
 
 
-QUICK = ScalingPlan(shared=(2, 16, 64), single=(2, 8, 16, 32, 64, 128), weak=32, repeats=6)
+QUICK = ScalingPlan(
+    shared=(2, 16, 64),
+    single=(2, 8, 16, 32, 64, 128),
+    weak=32,
+    repeats=6,
+    groups=((16, 1.0), (256, 1.0), (256, 100.0)),
+)
 FULL = ScalingPlan(
-    shared=(2, 16, 64, 256), single=(2, 8, 16, 32, 64, 128, 256, 512, 1024), weak=64, repeats=12
+    shared=(2, 16, 64, 256),
+    single=(2, 8, 16, 32, 64, 128, 256, 512, 1024),
+    weak=64,
+    repeats=12,
+    groups=(*QUICK.groups, (4096, 100.0)),
 )
 
 

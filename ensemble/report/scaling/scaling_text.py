@@ -31,6 +31,16 @@ _COST = {
     "peak memory (bytes)": "peak_memory_bytes",
     "seconds with fast summation (model)": "with_fast_summation",
 }
+_GROUPS = {
+    "groups": "groups",
+    "points": "points",
+    "seconds a run": "run_seconds",
+    "runs": "runs",
+    "seconds": "wall_seconds",
+    "busy": "busy",
+    "dispatcher's share of rank 0": "dispatcher_share",
+    "its seconds a run": "dispatcher_seconds_a_run",
+}
 _PREDICTION = {"vesicles": "vesicles", "ranks": "ranks", "efficiency": "efficiency"}
 
 
@@ -56,6 +66,11 @@ def scaling_conclusions(report: Scaling) -> list[str]:
         f"Ranks that are worth it (the model is {LEAST_EFFICIENCY:.0%} efficient): {worth}.",
         f"Fast summation would pay {pays}.",
         f"The model's largest deviation from a measured time is {report.largest_misprediction:.0%}.",
+        *(
+            f"{row.groups} groups with runs of {row.run_seconds:.2g} s, simulated: {row.busy:.0%} busy, "
+            f"while the dispatcher takes {row.dispatcher_share:.1%} of rank 0."
+            for row in report.groups[-1:]
+        ),
         *(["There are more ranks than cores, so the times mean nothing."] if report.oversubscribed else []),
     ]
 
@@ -108,8 +123,24 @@ def scaling_text(report: Scaling, figures: Sequence[str]) -> str:
         f"evaluation.  Against that, series of whole vesicles make the time above grow by {model.pair:.2g} s "
         f"for each pair.",
         table(_COST, report.costs),
+        "## Many groups of ranks",
+        *_groups(report),
     ]
     return "\n\n".join(sections) + "\n"
+
+
+def _groups(report: Scaling) -> list[str]:
+    if not report.groups:
+        return [
+            "The store has too few runs to take their times from; `ensemble bisect` makes them, and then "
+            "this report says how busy thousands of groups are."
+        ]
+    return [
+        "A boundary in simulated time.  The dispatcher is the real one, and its work passes as it takes; "
+        "messages and commits take what was measured here; simulations take as long as runs in the store, or "
+        "a hundred times as long.",
+        table(_GROUPS, report.groups),
+    ]
 
 
 def _constants(model: ScalingModel) -> str:

@@ -33,9 +33,12 @@ from ensemble.report.scaling.scaling_fit import (
 )
 from ensemble.report.scaling.scaling_plan import FULL, POINTS, QUICK, ScalingPlan, suspension
 from ensemble.report.scaling.scaling_text import scaling_conclusions, scaling_text
+from ensemble.report.scaling.simulated_groups import FEWEST_RUNS, MeasuredCosts, simulate_groups
 from ensemble.report.scaling.time_shares import _PART_OF_FOLDER, _PART_OF_MODULE, PARTS, time_shares
+from ensemble.store import Store
 from solver.parallel import SERIAL
 from tests.conftest import Launcher
+from tests.ensemble.runs import shear_run, shear_scene
 
 KNOWN = ScalingModel(
     pair=3e-8,
@@ -156,6 +159,36 @@ def test_plans_reach_from_a_pair_to_many(plan):
     assert len(suspension(16).vesicles) == 16
 
 
+FREE = MeasuredCosts(message=0.0, commit=0.0, commit_work=0.0, further_commit=0.0)
+
+
+def test_one_simulated_group_takes_the_time_of_its_runs(tmp_path: Path) -> None:
+    use = simulate_groups(1, [10.0], FREE, tmp_path)
+    assert use.points == 1
+    assert use.runs >= 2
+    assert use.wall_seconds == pytest.approx(10.0 * use.runs, rel=0.1)
+    assert use.busy > 0.9
+    assert 0 < use.dispatcher_share < 0.1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_slow_commits_take_time_but_little_work(tmp_path: Path) -> None:
+    slow = MeasuredCosts(message=0.0, commit=10.0, commit_work=1.0, further_commit=1.0)
+    use = simulate_groups(1, [10.0], slow, tmp_path)
+    assert use.wall_seconds == pytest.approx(20.0 * use.runs, rel=0.1)
+    assert use.dispatcher_seconds_a_run == pytest.approx(1.0, rel=0.2)
+
+
+def test_costs_are_measured_with_stored_runs(tmp_path: Path) -> None:
+    with Store.open(tmp_path / "store") as store:
+        for number in range(FEWEST_RUNS):
+            store.save(shear_run(shear_scene(rate=0.5 + 0.01 * number)))
+        costs = MeasuredCosts.here(store, tmp_path)
+    assert 0 < costs.commit_work <= costs.commit
+    assert costs.message > 0
+    assert [path.name for path in tmp_path.iterdir()] == ["store"]
+
+
 MEASURING = """
 import json, sys
 from pathlib import Path
@@ -186,6 +219,10 @@ def measured(launcher: Launcher, ranks: int, plan: ScalingPlan, directory: Path)
 def assert_drawn_and_written(report: Scaling, directory: Path) -> None:
     """Figures and text show what the report holds."""
     figures = scaling_figures(report)
+    assert "`ensemble bisect` makes them" in scaling_text(report, [])
+    use = simulate_groups(4, [10.0], FREE, directory)
+    report = report.model_copy(update={"groups": [use]})
+    assert f"4 groups with runs of 10 s, simulated: {use.busy:.0%} busy" in scaling_text(report, [])
     assert figures.keys() == {"efficiency", "parts", "cost"}
     for name, figure in figures.items():
         save(figure, directory / f"{name}.png")
