@@ -81,7 +81,7 @@ def test_its_figure_is_that_of_a_run(staging: RunStaging, tmp_path: Path) -> Non
     key = kept_after(staging, PAIR, 20)
     with Store.existing(staging.path) as store:
         (answer,) = (found for kind in kinds() if (found := kind.stored(store, key)))
-    answer.draw(tmp_path / "run.svg")
+    answer.draw(tmp_path / "run.svg", USUAL)
     assert "the run has not ended" in (tmp_path / "run.svg").read_text()
 
 
