@@ -6,8 +6,9 @@ They are read and written piece by piece, so an answer needs little memory howev
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from pydantic import BaseModel
@@ -15,6 +16,7 @@ from pydantic_core import to_json
 
 from ensemble.errors import BadInput
 from ensemble.store.archive import StoredArrays
+from ensemble.store.recorded_blocks import RecordedArray
 from solver.analysis.run import Array
 from solver.membrane.curve import positions
 
@@ -58,13 +60,99 @@ class FramesDocument(BaseModel):
     total: int
 
 
+class SeriesArrays(Protocol):
+    """Diagnostics of a run, of which some rows are read.
+
+    Attributes
+    ----------
+    series : sequence of str
+        Their names.
+    """
+
+    @property
+    def series(self) -> Sequence[str]:
+        """The names of the diagnostics."""
+
+    def shape(self, name: str) -> tuple[int, ...]:
+        """Return the shape of one: the number of its records.
+
+        Parameters
+        ----------
+        name : str
+
+        Returns
+        -------
+        tuple of int
+        """
+
+    def rows(self, name: str, numbers: range) -> Array:
+        """Read some records of one.
+
+        Parameters
+        ----------
+        name : str
+        numbers : range
+            Of records that exist, ascending.
+
+        Returns
+        -------
+        (records,)
+        """
+
+
+class UnfinishedSeries:
+    """Diagnostics of a run that is not done.
+
+    Parameters
+    ----------
+    recorded : mapping of str to RecordedArray
+        By name.
+
+    Attributes
+    ----------
+    series : sequence of str
+        Their names.
+    """
+
+    def __init__(self, recorded: Mapping[str, RecordedArray]) -> None:
+        self._recorded = recorded
+        self.series: Sequence[str] = sorted(recorded)
+
+    def shape(self, name: str) -> tuple[int, ...]:
+        """Return the shape of one; see `SeriesArrays`.
+
+        Parameters
+        ----------
+        name : str
+
+        Returns
+        -------
+        tuple of int
+        """
+        return self._recorded[name].shape
+
+    def rows(self, name: str, numbers: range) -> Array:
+        """Read some records of one; see `SeriesArrays`.
+
+        Parameters
+        ----------
+        name : str
+        numbers : range
+
+        Returns
+        -------
+        (records,)
+        """
+        return self._recorded[name][numbers.start : numbers.stop][:: numbers.step]
+
+
 @dataclass(frozen=True)
 class SeriesSelection:
     """Some of the records of some diagnostics of a run.
 
     Attributes
     ----------
-    arrays : StoredArrays
+    arrays : SeriesArrays
     names : sequence of str
     numbers : range
         Of the records.
@@ -72,20 +160,20 @@ class SeriesSelection:
         Number of records of the run.
     """
 
-    arrays: StoredArrays
+    arrays: SeriesArrays
     names: Sequence[str]
     numbers: range
     total: int
 
     @classmethod
     def of(
-        cls, arrays: StoredArrays, names: Sequence[str], numbers: range, maximum_values: int
+        cls, arrays: SeriesArrays, names: Sequence[str], numbers: range, maximum_values: int
     ) -> SeriesSelection:
         """Select records.
 
         Parameters
         ----------
-        arrays : StoredArrays
+        arrays : SeriesArrays
             Of a run.
         names : sequence of str
             Names of diagnostics; if it is empty, all are selected.
@@ -104,7 +192,7 @@ class SeriesSelection:
             If the run has no diagnostic of a name, or the records hold more values; the message says how
             many records are allowed.
         """
-        present = arrays.summary.series
+        present = arrays.series
         unknown = set(names) - set(present)
         if unknown:
             raise BadInput(f"name: {min(unknown)!r} — must be one of {', '.join(sorted(present))}")

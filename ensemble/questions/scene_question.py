@@ -73,6 +73,7 @@ class SceneQuestion(Question[Scene]):
     command = "run"
     title = "Simulate one scene"
     collection = "runs"
+    answer_grows = True
     answer_title = "run"
     has_many_runs = False
     scene_path = ""

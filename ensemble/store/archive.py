@@ -36,6 +36,11 @@ class StoredArrays(StoredGroup):
         super().__init__(directory, "run")
         self.summary = _summary(self.name, self.attributes)
 
+    @property
+    def series(self) -> tuple[str, ...]:
+        """The names of the recorded diagnostics."""
+        return self.summary.series
+
     def run(self) -> Run:
         """Read the whole run; every number has the bits that were written.
 

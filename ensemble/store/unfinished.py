@@ -16,6 +16,8 @@ from ensemble.store.writers import STAGING, lives
 from solver.scene import Scene
 
 if TYPE_CHECKING:
+    from ensemble.store.recorded_blocks import RecordedArray
+    from solver.analysis.record import Block
     from solver.analysis.run import Run
     from solver.memory import Saved
 
@@ -124,6 +126,30 @@ class UnfinishedRun:
                 memory.take(part, read_block(self.place, part, number))
         return run_so_far(self.scene, self.saved, memory)
 
+    def arrays(self) -> dict[str, dict[str, RecordedArray]]:
+        """Return what has been recorded, to read some of its rows.
+
+        Returns
+        -------
+        dict of str to dict of str to RecordedArray
+            By the part of the record, and by name.
+
+        Raises
+        ------
+        StoreError
+            If it cannot be read; see `run`.
+        """
+        from ensemble.store.recorded_blocks import read_block, recorded_arrays
+        from solver.simulation.run_so_far import open_blocks
+
+        last = open_blocks(self.saved)
+
+        def read(part: str, number: int) -> Block:
+            return last[part] if number == self.counts.get(part, 0) else read_block(self.place, part, number)
+
+        parts = self.counts.keys() | last.keys()
+        return recorded_arrays({part: self.counts.get(part, 0) + (part in last) for part in parts}, read)
+
     def json_document(self) -> dict[str, Any]:
         """Return how far the run has come, its last diagnostics, and its scene.
 
@@ -132,19 +158,19 @@ class UnfinishedRun:
         dict
             JSON data.
         """
-        run = self.run()
-        series = run.series if run else {}
+        from solver.simulation.run_so_far import sample_so_far
+
+        arrays = self.arrays()
         return {
             "run_key": self.key,
             "status": "in progress" if self.in_progress else "interrupted",
             "written": self.written.isoformat(timespec="seconds"),
             "time": self.time,
             "horizon": self.scene.horizon,
-            "steps": run.work.steps if run else None,
             "wall_seconds": self.saved["wall_seconds"],
-            "samples": len(series["time"]) if run else 0,
-            "frames": len(run.frames.time) if run else 0,
-            "last": {name: float(values[-1]) for name, values in series.items()},
+            "samples": arrays["series"]["time"].shape[0] if arrays else 0,
+            "frames": arrays["frames"]["time"].shape[0] if arrays else 0,
+            "last": sample_so_far(self.saved),
             "scene": self.scene.model_dump(mode="json", exclude_none=True),
         }
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from solver.analysis.record import FRAMES, SERIES, VESICLE_SERIES, InMemory, open_rows
+from solver.analysis.record import FRAMES, SERIES, VESICLE_SERIES, open_rows
 from solver.analysis.run import Energy, Errors, Outcome, Run, RunResults, Work
 
 if TYPE_CHECKING:
+    from solver.analysis.record import Block, InMemory
     from solver.memory import Saved
     from solver.scene import Scene
 
@@ -26,6 +27,42 @@ def time_so_far(saved: Saved) -> float | None:
         None while the start relaxes.
     """
     return float(saved["loop"]["time"]) if saved["loop"] else None
+
+
+def sample_so_far(saved: Saved) -> dict[str, float]:
+    """Return the diagnostics that a simulation has recorded last.
+
+    Parameters
+    ----------
+    saved : dict
+        As `Simulation.saved` returned it.
+
+    Returns
+    -------
+    dict of str to float
+        By the name of their series; empty while the start relaxes.
+    """
+    return dict(saved["loop"]["recorder"]["sample"]) if saved["loop"] else {}
+
+
+def open_blocks(saved: Saved) -> dict[str, Block]:
+    """Return what a simulation has recorded and not given to its sink.
+
+    Parameters
+    ----------
+    saved : dict
+        As `Simulation.saved` returned it.
+
+    Returns
+    -------
+    dict of str to dict of str to array
+        By the part of the record.
+    """
+    if not saved["loop"]:
+        return {}
+    recorder = saved["loop"]["recorder"]
+    blocks = {part: open_rows(recorder[f"_{part}"]) for part in (SERIES, VESICLE_SERIES, FRAMES)}
+    return {part: rows for part, rows in blocks.items() if rows}
 
 
 def run_so_far(scene: Scene, saved: Saved, memory: InMemory) -> Run | None:
@@ -47,11 +84,9 @@ def run_so_far(scene: Scene, saved: Saved, memory: InMemory) -> Run | None:
     loop = saved["loop"]
     if not loop:
         return None
+    for part, rows in open_blocks(saved).items():
+        memory.take(part, rows)
     recorder = loop["recorder"]
-    for part in (SERIES, VESICLE_SERIES, FRAMES):
-        rows = open_rows(recorder[f"_{part}"])
-        if rows:
-            memory.take(part, rows)
     sample = recorder["sample"]
     return memory.run(
         RunResults(

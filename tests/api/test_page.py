@@ -23,12 +23,14 @@ from ensemble.report import PAGE, ReportName, report_directory
 from ensemble.report.report_page import report_page
 from ensemble.search.boundary import Boundary, BoundaryPoint
 from ensemble.store import Store
+from solver import Simulation
 from solver.analysis.run import Outcome, Run
 from solver.flows import FLOWS
 from tests.api.processes import wait_until
 from tests.api.servers import make_token, serving
 from tests.api.services import service, start_service
 from tests.ensemble.runs import shear_run
+from tests.solver.restarts import PAIR
 
 # The default of 5 s is too short on a busy machine.
 expect.set_options(timeout=30_000)
@@ -380,6 +382,24 @@ def test_the_flow_is_known_between_and_beyond_the_places_where_it_was_sampled(
     np.testing.assert_allclose(np.transpose(answer), expected, atol=1e-12)
 
 
+def test_a_run_in_progress_is_watched_until_it_is_done(page: Page, url: str, store: Path) -> None:
+    with Store.open(store) as opened:
+        checkpoint = opened.checkpoint(PAIR)
+        simulation = Simulation(PAIR, sink=checkpoint.record)
+        page.goto(f"{url}/#/runs/{checkpoint.key}")
+        expect(page.get_by_text("shown from its first checkpoint on")).to_be_visible()
+        while simulation.time < PAIR.horizon / 2:
+            simulation.step()
+        checkpoint.write(simulation.saved())
+        page.reload()
+        expect(page.get_by_role("heading", name="In progress")).to_be_visible()
+        expect(page.get_by_text(f"of {PAIR.horizon:g} at the latest")).to_be_visible()
+        page.locator(".plot .main-svg").first.wait_for()
+        opened.commit(opened.stage_recorded(simulation.finish(), checkpoint.record))
+        expect(page.get_by_role("heading", name="Undecided")).to_be_visible(timeout=60_000)
+        page.locator("canvas").first.wait_for()
+
+
 def test_a_long_run_is_fetched_in_several_requests(page: Page, url: str, run: Run) -> None:
     page.goto(url)
     summary = httpx2.get(f"{url}/runs/{run_key(run.scene)}").json()
@@ -397,7 +417,7 @@ def test_of_a_long_run_some_records_are_fetched(page: Page, url: str, run: Run) 
     page.goto(url)
     series = """async ([key, most]) => {
         const { seriesOf } = await import(document.scripts[0].src.replace('main', 'series'));
-        return (await seriesOf(key, new AbortController().signal, most)).time;
+        return (await seriesOf(`/runs/${key}`, new AbortController().signal, most)).time;
     }"""
     times = run.series["time"].tolist()
     assert page.evaluate(series, [run_key(run.scene), 500_000]) == pytest.approx(times)

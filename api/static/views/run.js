@@ -1,4 +1,4 @@
-/** One run: a player, its diagnostics, its results and its scene. */
+/** One run: a player, its diagnostics, its results and its scene; as far as it is, if it is not done. */
 
 import { get } from "../api.js";
 import { Cursor } from "../cursor.js";
@@ -11,12 +11,29 @@ import { MARGIN, histories } from "../history.js";
 import { outcomeLabel } from "../outcomes.js";
 import { Player } from "../player.js";
 import { Plot } from "../plot.js";
+import { Problem } from "../problems.js";
 import { keepInAddress } from "../router.js";
 import { seriesOf } from "../series.js";
 import { describe } from "../symbols.js";
+import { watchRun } from "./unfinished_run.js";
 
 /** @param {import("../router.js").Place} place */
-export async function showRun({ content, parameters, query, signal }) {
+export async function showRun(place) {
+  try {
+    await showFinishedRun(place);
+  } catch (problem) {
+    if (!(problem instanceof Problem) || problem.status !== 404) {
+      throw problem;
+    }
+    if (!(await watchRun(place))) {
+      throw new Problem(404, `${problem.message}; one in progress is shown from its first checkpoint on`);
+    }
+    await showRun(place); // it is done
+  }
+}
+
+/** @param {import("../router.js").Place} place */
+async function showFinishedRun({ content, parameters, query, signal }) {
   const { key } = parameters;
   const run = await get(`/runs/${key}`, signal);
   document.title = `Run ${key.slice(0, 8)}: ${run.outcome} – Vesicle ensemble`;
@@ -38,7 +55,7 @@ export async function showRun({ content, parameters, query, signal }) {
   const [frames, flow, series] = await Promise.all([
     Frames.of(run, signal),
     ImposedFlow.of(key, signal),
-    seriesOf(key, signal),
+    seriesOf(`/runs/${key}`, signal),
   ]);
   loading.remove();
   const plot = new Plot(plots, signal);

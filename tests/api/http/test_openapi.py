@@ -47,6 +47,8 @@ def test_every_route_is_described(paths):
         ("get", "/runs/{key}/frames"),
         ("get", "/runs/{key}/flow"),
         ("get", "/runs/{key}/file"),
+        ("get", "/unfinished-runs/{key}"),
+        ("get", "/unfinished-runs/{key}/series"),
         ("get", "/flows"),
         ("get", "/kinds"),
         ("get", "/kinds/{kind}/schema"),
