@@ -21,6 +21,7 @@ from ensemble.cli import (
     question_commands,
     report_commands,
     schema_command,
+    start_command,
     steady_commands,
     store_commands,
     units_command,
@@ -42,6 +43,7 @@ for _command in (
     *store_commands.COMMANDS,
     report_commands.report,
     preset_command.presets,
+    start_command.start_from,
     units_command.units,
     schema_command.schema,
 ):

@@ -22,7 +22,7 @@ def resampled_angle(tangent_angle: Array, points: int) -> Array:
     ----------
     tangent_angle : (..., N)
     points : int
-        At least N.
+        If fewer than N, waves that they cannot tell apart are left out.
 
     Returns
     -------

@@ -141,14 +141,14 @@ def interpolations(points: int, largest_factor: int) -> Array:
 
 
 def resampled(values: Array, points: int) -> Array:
-    """Interpolate periodic values trigonometrically to more points.
+    """Interpolate periodic values trigonometrically to more points, or to fewer without the shortest waves.
 
     Parameters
     ----------
     values : (..., N)
         N even.
     points : int
-        Even, at least N.
+        Even.
 
     Returns
     -------
@@ -158,7 +158,10 @@ def resampled(values: Array, points: int) -> Array:
     if points == given:
         return values
     spectrum = np.fft.rfft(values, axis=-1)
-    spectrum[..., -1] *= 0.5  # the highest mode stands for the two that it cannot tell apart
+    if points > given:
+        spectrum[..., -1] *= 0.5  # the highest mode stands for the two that it cannot tell apart
+    else:
+        spectrum[..., points // 2 :] = 0
     return np.asarray(np.fft.irfft(spectrum, points, axis=-1)) * (points / given)
 
 

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from solver.scene import Scene, Vesicle
 
+_ROUND_OFF = 1e-12  # radians
+
 
 def has_images(scene: Scene) -> bool:
     """Return whether a scene consists of a vesicle and its image.
@@ -27,11 +29,24 @@ def has_images(scene: Scene) -> bool:
     """
     if len(scene.vesicles) != 2 or (scene.flow is not None and not scene.flow.odd):
         return False
+    if scene.start.deformation is not None:
+        return False  # each has its own
     first, second = scene.vesicles
-    alike = second.model_copy(update={"center": first.center, "angle": first.angle}) == first
+    placed = {"center": first.center, "angle": first.angle, "tangent_angle": first.tangent_angle}
+    alike = second.model_copy(update=placed) == first
     opposite = all(a == -b for a, b in zip(first.center, second.center, strict=True))
-    aligned = abs(math.remainder(first.angle - second.angle, math.pi)) < 1e-12  # ellipses
-    return alike and opposite and aligned
+    return alike and opposite and _half_a_turn_apart(first, second)
+
+
+def _half_a_turn_apart(first: Vesicle, second: Vesicle) -> bool:
+    """Return whether a half turn makes the shape of one vesicle that of the other, to round-off."""
+    if first.tangent_angle is None and second.tangent_angle is None:
+        return abs(math.remainder(first.angle - second.angle, math.pi)) < _ROUND_OFF  # ellipses
+    shapes = first.tangent_angle or (), second.tangent_angle or ()
+    turn = second.angle - first.angle - math.pi
+    return len(shapes[0]) == len(shapes[1]) and all(
+        abs(math.remainder(b - a + turn, 2 * math.pi)) < _ROUND_OFF for a, b in zip(*shapes, strict=True)
+    )
 
 
 def independent_vesicles(scene: Scene) -> tuple[Vesicle, ...]:

@@ -165,7 +165,7 @@ def distances(first: Ellipses, second: Ellipses) -> Array:
 
 
 def overlapping_pair(vesicles: tuple[Vesicle, ...]) -> tuple[int, int] | None:
-    """Return the indices of the first two vesicles that touch or overlap at the start.
+    """Return the indices of the first two ellipses that touch or overlap.
 
     Only neighbors are compared, found in a tree, so the work grows like the number of vesicles.  For most of
     them a lower bound of the distance is enough.

@@ -20,6 +20,7 @@ from solver.scene.arrangement import Arrangement
 from solver.scene.criteria import Criteria
 from solver.scene.ellipses import overlapping_pair
 from solver.scene.numerics import Numerics
+from solver.scene.outlines import outline, outlines_overlap
 from solver.scene.output import Output
 from solver.scene.start import Start
 from solver.scene.units import Units
@@ -103,7 +104,7 @@ class Scene(Model):
 
     @model_validator(mode="after")
     def _apart(self) -> Self:
-        pair = overlapping_pair(self.vesicles)
+        pair = _overlapping_pair(self.vesicles)
         if pair:
             i, j = pair
             raise ValueError(
@@ -116,6 +117,21 @@ class Scene(Model):
     def _relaxed_pair(self) -> Self:
         if self.start.relaxed and len(self.vesicles) != 2:
             raise ValueError(f"start.relaxed needs exactly 2 vesicles, got {len(self.vesicles)}")
+        return self
+
+    @model_validator(mode="after")
+    def _deformed_within_reason(self) -> Self:
+        deformation = self.start.deformation
+        if deformation is None:
+            return self
+        # Two waves of the amplitude a take 4/3·a² of the reduced area: at most half of what it lacks to 1.
+        roundest = max(vesicle.reduced_area for vesicle in self.vesicles)
+        most = math.sqrt(3 / 8 * (1 - roundest))
+        if deformation.amplitude > most:
+            raise ValueError(
+                f"start.deformation.amplitude must be at most {most:.4g} for the reduced area {roundest:g}, "
+                f"got {deformation.amplitude:g}"
+            )
         return self
 
     @property
@@ -182,3 +198,21 @@ class Scene(Model):
                 f"got {len(self.vesicles)}: it needs the exact Jacobian"
             )
         return self
+
+
+def _overlapping_pair(vesicles: tuple[Vesicle, ...]) -> tuple[int, int] | None:
+    """Return the indices of two vesicles that overlap at the start, None if all are apart."""
+    given = [index for index, vesicle in enumerate(vesicles) if vesicle.tangent_angle is not None]
+    ellipses = [index for index, vesicle in enumerate(vesicles) if vesicle.tangent_angle is None]
+    among_ellipses = overlapping_pair(tuple(vesicles[index] for index in ellipses))
+    if among_ellipses:
+        first, second = among_ellipses
+        return ellipses[first], ellipses[second]
+    outlines = [outline(vesicle) for vesicle in vesicles] if given else []
+    for index in given:
+        for other in (*ellipses, *(each for each in given if each > index)):
+            apart = math.dist(vesicles[index].center, vesicles[other].center)
+            reach = (vesicles[index].length + vesicles[other].length) / 2
+            if apart < reach and outlines_overlap(outlines[index], outlines[other]):
+                return min(index, other), max(index, other)
+    return None

@@ -2,10 +2,29 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Self
+
+from pydantic import Field, model_validator
 
 from solver.dimensions import ANGLE, TIME
 from solver.model import Model, Positive
+
+
+class RandomWaves(Model):
+    """Random long waves on the membranes, which break every symmetry.  Equal seeds make equal ones.
+
+    Attributes
+    ----------
+    amplitude : float
+        Root mean square of the change of tangent angles, radians.
+    seed : int
+    waves : int
+        The most waves on a membrane.
+    """
+
+    amplitude: Annotated[Positive, ANGLE]
+    seed: int = Field(0, ge=0, lt=2**63)
+    waves: int = Field(8, ge=2, le=16)
 
 
 class Start(Model):
@@ -19,9 +38,19 @@ class Start(Model):
     horizon : float
         Time by which the relaxation must have come to rest.
     tilt : float
-        Radians.
+        Any angle, radians.
+    deformation : RandomWaves or None
+        Of the vesicles as placed; None leaves them as they are.
     """
 
     relaxed: bool = False
     horizon: Annotated[Positive, TIME] = 1000.0
     tilt: Annotated[float, ANGLE] = 1e-3
+    # Left out where there is none, so that keys of scenes are what they were before there were any.
+    deformation: RandomWaves | None = Field(None, exclude_if=lambda deformation: deformation is None)
+
+    @model_validator(mode="after")
+    def _not_forgotten(self) -> Self:
+        if self.relaxed and self.deformation is not None:
+            raise ValueError("deformation: a pair that relaxes forgets it; leave one of the two out")
+        return self

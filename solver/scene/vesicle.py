@@ -5,17 +5,21 @@ from __future__ import annotations
 import math
 from typing import Annotated
 
-from pydantic import Field
+import numpy as np
+from pydantic import Field, ValidationInfo, field_validator
 
 from solver.dimensions import ANGLE, BENDING_MODULUS, LENGTH
 from solver.model import Model, Positive
+from solver.scene.tangent_angles import reduced_area_of
 
 # A vesicle whose reduced area is less than this below 1 is circular: its curvature varies by 3e-5 at most.
 _ROUNDNESS = 1e-9
+# By so much the reduced area of a given shape may be another one, and its ends may lie apart over its length.
+_MISMATCH = 0.01
 
 
 class Vesicle(Model):
-    """An inextensible membrane that starts as an ellipse of exactly this reduced area and length.
+    """An inextensible membrane of exactly this reduced area and length that starts as an ellipse or as given.
 
     Attributes
     ----------
@@ -30,7 +34,11 @@ class Vesicle(Model):
     center : (2,)
         Position, x and y.
     angle : float
-        Of the long axis against x, radians.
+        Of the long axis against x, radians; with a shape of its own, that by which the shape is turned.
+    tangent_angle : tuple of float or None
+        The shape in which it starts instead of an ellipse: tangent angles at points equispaced in arclength,
+        counterclockwise, radians.  `ensemble start-from` writes them.  Their reduced area may differ by 0.01
+        from the one above, which counts.
     """
 
     reduced_area: float = Field(0.9, gt=0, le=1)
@@ -39,6 +47,27 @@ class Vesicle(Model):
     viscosity_contrast: Positive = 1.0
     center: tuple[Annotated[float, LENGTH], Annotated[float, LENGTH]] = (0.0, 0.0)
     angle: Annotated[float, ANGLE] = math.pi / 2
+    # Left out where there is none, so that keys of scenes are what they were before there were any.
+    tangent_angle: tuple[Annotated[float, ANGLE], ...] | None = Field(
+        None, min_length=16, max_length=4096, exclude_if=lambda shape: shape is None
+    )
+
+    @field_validator("tangent_angle")
+    @classmethod
+    def _encloses_the_area(
+        cls, shape: tuple[float, ...] | None, info: ValidationInfo
+    ) -> tuple[float, ...] | None:
+        if shape is None:
+            return None
+        if len(shape) % 2:
+            raise ValueError(f"must have an even number of angles, got {len(shape)}")
+        enclosed, gap = reduced_area_of(np.array(shape))
+        if not gap < _MISMATCH or not 0 < enclosed < 1 + _MISMATCH:
+            raise ValueError("must be those of a closed curve that is run through counterclockwise")
+        wanted = info.data.get("reduced_area")
+        if wanted is not None and not abs(enclosed - wanted) < _MISMATCH:
+            raise ValueError(f"have the reduced area {enclosed:.6g}, and reduced_area is {wanted:g}")
+        return shape
 
     @property
     def is_circle(self) -> bool:

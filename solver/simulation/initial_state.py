@@ -8,17 +8,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.membrane.geometry import Membranes
-from solver.membrane.shapes import ellipse_tangent_angle, of_reduced_area
+from solver.membrane.resampling import resampled_angle
+from solver.membrane.shapes import closed_of_reduced_area, ellipse_tangent_angle, of_reduced_area
+from solver.membrane.spectral import equispaced_angles
 from solver.membrane.symmetry import independent_vesicles
 
 if TYPE_CHECKING:
-    from solver.scene import Scene
+    from solver.scene import Scene, Vesicle
+    from solver.scene.start import RandomWaves
 
 Array = NDArray[np.float64]
 
 
-def initial_ellipses(scene: Scene) -> Array:
-    """Return the state of ellipses where the scene places its vesicles.
+def placed_state(scene: Scene) -> Array:
+    """Return the state of the vesicles in their shapes, where the scene places them.
 
     Parameters
     ----------
@@ -31,14 +34,35 @@ def initial_ellipses(scene: Scene) -> Array:
     """
     vesicles, membranes = independent_vesicles(scene), Membranes.of_scene(scene)
     tangent_angle = [
-        of_reduced_area(
-            ellipse_tangent_angle(vesicle.reduced_area, vesicle.length, vesicle.angle, membranes.points),
-            vesicle.reduced_area,
-        )
-        for vesicle in vesicles
+        _shape(vesicle, index, scene.start.deformation, membranes.points)
+        for index, vesicle in enumerate(vesicles)
     ]
     center = [vesicle.center for vesicle in vesicles]
     return membranes.pack(np.array(tangent_angle), np.array(center))
+
+
+def _shape(vesicle: Vesicle, index: int, deformation: RandomWaves | None, points: int) -> Array:
+    """Return the tangent angles of a vesicle, (points,)."""
+    area = vesicle.reduced_area
+    if vesicle.tangent_angle is None:
+        shape = of_reduced_area(ellipse_tangent_angle(area, vesicle.length, vesicle.angle, points), area)
+    else:
+        given = resampled_angle(np.array(vesicle.tangent_angle), points)
+        shape = closed_of_reduced_area(given + vesicle.angle, area)
+    if deformation is None:
+        return shape
+    return closed_of_reduced_area(shape + _random_waves(deformation, index, points), area)
+
+
+def _random_waves(deformation: RandomWaves, index: int, points: int) -> Array:
+    """Return the change of the tangent angles of a vesicle, the same whatever the number of points."""
+    random = np.random.default_rng((deformation.seed, index))
+    # One wave would open the curve.
+    waves = np.arange(2, deformation.waves + 1)
+    cosines, sines = random.standard_normal((2, waves.size))
+    alpha = waves[:, None] * equispaced_angles(points)
+    change = cosines @ np.cos(alpha) + sines @ np.sin(alpha)
+    return np.asarray(deformation.amplitude * change / np.sqrt((cosines**2 + sines**2).sum() / 2))
 
 
 def rotated_state(membranes: Membranes, state: Array, tilt: float) -> Array:

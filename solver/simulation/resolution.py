@@ -22,7 +22,7 @@ from solver.motion.equation import accuracy_of
 from solver.potentials.neighbors import Neighbors
 from solver.potentials.proximity import Closeness, waist_error
 from solver.potentials.refinement import MAXIMUM_FACTOR
-from solver.simulation.initial_state import initial_ellipses
+from solver.simulation.initial_state import placed_state
 
 if TYPE_CHECKING:
     from solver.scene import Scene
@@ -182,7 +182,7 @@ class AdaptiveResolution:
     def _first(self, scene: Scene) -> int:
         for points in LADDER:
             placed = with_points(scene, points)
-            membranes, state = Membranes.of_scene(placed), initial_ellipses(placed)
+            membranes, state = Membranes.of_scene(placed), placed_state(placed)
             geometry = Geometry(membranes, state)
             resolves_contact = self._closest >= self._least_distance * membranes.spacing.max()
             if resolves_contact and self._apart(geometry) and self._smooth(geometry, 0.0, state):

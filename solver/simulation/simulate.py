@@ -19,7 +19,7 @@ from solver.membrane.geometry import Membranes
 from solver.motion.terms import accurate_equation
 from solver.parallel import SERIAL, Parallel, first_rank_asks
 from solver.simulation.blas_threads import one_blas_thread
-from solver.simulation.initial_state import initial_ellipses, rotated_state
+from solver.simulation.initial_state import placed_state, rotated_state
 from solver.simulation.moving_frame import MovingFrame
 from solver.simulation.resolution import UnresolvedError, resolution_of, with_points
 from solver.simulation.run_results import results_of
@@ -100,7 +100,7 @@ class Simulation:
             if self._within.start.relaxed:
                 self._relaxation = Simulation(_at_rest(self._within), parallel=parallel, sink=Forgetful())
             else:
-                self._begin(_Start(points, initial_ellipses(with_points(self._within, points))))
+                self._begin(_Start(points, placed_state(with_points(self._within, points))))
 
     def _prepare(self, scene: Scene, parallel: Parallel, sink: Sink | None, elapsed: float) -> None:
         """Set what the scene alone decides, and the wall time that is used up."""
@@ -286,7 +286,7 @@ class Simulation:
             simulation._start_points = saved["start_points"]
             simulation._start_evaluations = saved["start_evaluations"]
             placed = with_points(simulation._within, simulation._start_points)
-            simulation._loop = simulation._time_loop(placed, initial_ellipses(placed))
+            simulation._loop = simulation._time_loop(placed, placed_state(placed))
             simulation._loop.restore(saved["loop"])
             simulation._sink.restore(saved["sink"])  # last: one that fails leaves it as it is
         return simulation
@@ -383,7 +383,7 @@ def _relaxed_start(
     evaluations = relaxed.work.rhs_evaluations
     if relaxed.outcome is not Outcome.EQUILIBRIUM:
         reason = relaxed.failure or f"{relaxed.outcome} at time {relaxed.time:g}"
-        placed = initial_ellipses(with_points(scene, points))
+        placed = placed_state(with_points(scene, points))
         return _Start(points, placed, evaluations, f"start: the pair did not relax ({reason})")
     tangent_angle, center = np.asarray(frame["tangent_angle"]), np.asarray(frame["center"])
     points = tangent_angle.shape[-1]

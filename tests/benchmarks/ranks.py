@@ -25,7 +25,7 @@ from ensemble.mpi.ranks import Ranks
 from solver.motion.terms import equation_of_motion
 from solver.parallel import SERIAL, Parallel
 from solver.scene import Scene
-from solver.simulation.initial_state import initial_ellipses
+from solver.simulation.initial_state import placed_state
 from solver.simulation.simulate import simulate
 
 Array = NDArray[np.float64]
@@ -79,7 +79,7 @@ def suspension(vesicles: int, points: int, area_fraction: float, horizon: float)
 
 def evaluation_seconds(scene: Scene, parallel: Parallel, timed: TimedCommunicator) -> tuple[float, float]:
     """Wall time of a right-hand side from a known tension, and the processor's outside of collectives."""
-    state = initial_ellipses(scene)
+    state = placed_state(scene)
     equation = equation_of_motion(scene, parallel)
     random = np.random.default_rng(0)
     equation.rate(state)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from solver.membrane.geometry import Geometry, Membranes
 from solver.scene import PowerLaw, Scene, Shear, Vesicle
-from solver.simulation.initial_state import initial_ellipses
+from solver.simulation.initial_state import placed_state
 
 Array = NDArray[np.float64]
 
@@ -49,7 +49,7 @@ def smooth_direction(membranes: Membranes, seed: int = 3) -> Array:
 
 def geometry_of(scene: Scene) -> Geometry:
     """The geometry in which a scene begins."""
-    return Geometry(Membranes.of_scene(scene), initial_ellipses(scene))
+    return Geometry(Membranes.of_scene(scene), placed_state(scene))
 
 
 def with_contrasts(scene: Scene, *contrasts: float) -> Scene:

@@ -19,7 +19,7 @@ from solver.motion.dense import DenseEquation
 from solver.motion.jacobian import DenseJacobian
 from solver.motion.terms import dense_equation
 from solver.scene import Numerics
-from solver.simulation.initial_state import initial_ellipses
+from solver.simulation.initial_state import placed_state
 from tests.solver.scenes import shear_pair
 
 Array = NDArray[np.float64]
@@ -112,7 +112,7 @@ def sheared_pair(begin: float) -> tuple[DenseEquation, Array, float]:
     """Adhering vesicles that have been in shear for some time, and the rate of their fastest mode."""
     scene = shear_pair(1.5, numerics=Numerics(points=32, tolerance=1e-9))
     dynamics = dense_equation(scene)
-    problem = InitialValueProblem(dynamics, initial_ellipses(scene), 0.0, begin)
+    problem = InitialValueProblem(dynamics, placed_state(scene), 0.0, begin)
     state = all_steps(BackwardDifferentiation(problem, 1e-8), begin)[-1].state
     return dynamics, state, float(-np.linalg.eigvals(dynamics.jacobian(state).matrix).real.min())
 

@@ -18,7 +18,7 @@ from ensemble.report.scaling.time_shares import time_shares
 from solver.motion.terms import equation_of_motion
 from solver.parallel import SERIAL, Array
 from solver.potentials.direct_sum import velocity
-from solver.simulation.initial_state import initial_ellipses
+from solver.simulation.initial_state import placed_state
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
@@ -94,7 +94,7 @@ def _measure_on_group(group: Intracomm, vesicles: int, repeats: int) -> Evaluati
     scene = suspension(vesicles)
     ranks = CountingRanks(Ranks(group) if group.Get_size() > 1 else SERIAL)
     equation = equation_of_motion(scene, ranks)
-    state = initial_ellipses(scene)
+    state = placed_state(scene)
     rate = equation.rate(state)
     membranes, flow = equation.membranes, scene.flow
     assert flow is not None

@@ -14,7 +14,7 @@ from solver.analysis.run import Run
 from solver.motion.terms import dense_equation, summed_equation
 from solver.parallel import SERIAL, Parallel
 from solver.scene import LARGEST_DENSE, Numerics, PowerLaw, Scene, Shear, Trap, Vesicle
-from solver.simulation.initial_state import initial_ellipses
+from solver.simulation.initial_state import placed_state
 from solver.simulation.simulate import simulate
 from tests.solver.scenes import shear_pair, uneven_pair
 from tests.solver.suspensions import suspension
@@ -38,14 +38,14 @@ DOUBLET = shear_pair(3.5, numerics=Numerics(points=32, tolerance=1e-3))
 
 def linearized(scene: Scene, parallel: Parallel) -> tuple[Array, Array]:
     """Right-hand side and Jacobian where a scene begins."""
-    dynamics, state = dense_equation(scene, parallel), initial_ellipses(scene)
+    dynamics, state = dense_equation(scene, parallel), placed_state(scene)
     return dynamics.rate(state), dynamics.jacobian(state).matrix
 
 
 def summed(scene: Scene, parallel: Parallel) -> tuple[Array, Array]:
     """Right-hand side and energy of adhesion of many vesicles where a scene begins."""
     sums = summed_equation(scene, parallel)
-    motion = sums.motion(initial_ellipses(scene))
+    motion = sums.motion(placed_state(scene))
     assert sums.adhesion
     assert motion.closeness
     return motion.rate, np.array([sums.adhesion.energy(motion.geometry, motion.closeness)])

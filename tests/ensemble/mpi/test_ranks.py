@@ -114,13 +114,13 @@ import numpy as np
 from ensemble.mpi.world import abort_guard, world
 from solver.motion.terms import equation_of_motion
 from ensemble.mpi.ranks import Ranks
-from solver.simulation.initial_state import initial_ellipses
+from solver.simulation.initial_state import placed_state
 from solver.forces.tension import TensionNotFoundError
 from tests.solver.suspensions import suspension
 communicator = world()
 with abort_guard(communicator):
     scene = suspension(7, 32)
-    state = initial_ellipses(scene)
+    state = placed_state(scene)
     state[6 * 32 : 7 * 32] += 10 * np.random.default_rng(1).standard_normal(32)
     equation = equation_of_motion(scene, Ranks(communicator))
     try:

@@ -19,7 +19,7 @@ from solver.membrane.symmetry import has_images
 from solver.model import Positive
 from solver.motion.terms import dense_equation
 from solver.scene import Numerics, Scene
-from solver.simulation.initial_state import initial_ellipses
+from solver.simulation.initial_state import placed_state
 from solver.simulation.simulate import simulate
 from tests.solver.scenes import smooth_direction, uneven_pair
 
@@ -86,7 +86,7 @@ def test_a_pair_that_a_half_turn_leaves_as_it_is_moves_along() -> None:
 def test_the_equation_of_motion_has_its_exact_jacobian() -> None:
     """Against fourth-order differences of the rate, along a smooth change of state."""
     scene = uneven_pair(flow=Kolmogorov(rate=0.4), numerics=Numerics(points=96, tolerance=1e-9))
-    equation, state, step = dense_equation(scene), initial_ellipses(scene), 1e-3
+    equation, state, step = dense_equation(scene), placed_state(scene), 1e-3
     direction = smooth_direction(equation.membranes)
     rates = [equation.rate(state + k * step * direction) for k in (-2, -1, 1, 2)]
     exact = np.array([1, -8, 8, -1]) @ np.array(rates) / (12 * step)

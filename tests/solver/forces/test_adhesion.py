@@ -17,7 +17,7 @@ from solver.membrane.geometry import Geometry, Membranes
 from solver.potentials.neighbors import gap
 from solver.potentials.proximity import Closeness
 from solver.scene import Numerics, PowerLaw, Scene, Vesicle
-from solver.simulation.initial_state import initial_ellipses
+from solver.simulation.initial_state import placed_state
 from tests.solver.references import Ellipse, integrate, nearest_parameter
 from tests.solver.scenes import geometry_of, smooth_direction, uneven_pair
 
@@ -66,7 +66,7 @@ def test_the_force_is_minus_the_gradient_of_the_energy(exponents: tuple[int, int
     """Work done along a deformation without stretching, against a fourth-order difference of the energy."""
     scene = uneven_pair(exponents=exponents, numerics=Numerics(points=128))
     geometry = geometry_of(scene)
-    membranes, state = geometry.membranes, initial_ellipses(scene)
+    membranes, state = geometry.membranes, placed_state(scene)
     direction, step = smooth_direction(membranes), 2e-3
     assert scene.adhesion
     adhesion = DirectAdhesion(scene.adhesion, 1e-12, membranes)
@@ -197,7 +197,7 @@ def test_the_jacobian_is_exact(exponents: tuple[int, int], points: int) -> None:
     At 32 points the nearest ones are refined.
     """
     scene = uneven_pair(exponents=exponents, numerics=Numerics(points=points))
-    state = initial_ellipses(scene)
+    state = placed_state(scene)
     geometry = geometry_of(scene)
     membranes = geometry.membranes
     assert scene.adhesion

@@ -10,7 +10,7 @@ from scipy.integrate import quad
 from solver.forces.bending import Bending, bending_of
 from solver.membrane.geometry import Geometry
 from solver.scene import Numerics, Scene, Vesicle
-from solver.simulation.initial_state import initial_ellipses
+from solver.simulation.initial_state import placed_state
 from tests.solver.references import Ellipse
 from tests.solver.scenes import geometry_of, smooth_direction, uneven_pair
 
@@ -75,7 +75,7 @@ def test_a_circle_of_radius_r_has_the_energy_pi_kappa_over_r() -> None:
 def test_the_force_is_minus_the_gradient_of_the_energy() -> None:
     """Work done along a deformation without stretching, against a fourth-order difference of the energy."""
     scene = uneven_pair(numerics=Numerics(points=128))
-    geometry, state = geometry_of(scene), initial_ellipses(scene)
+    geometry, state = geometry_of(scene), placed_state(scene)
     membranes, step = geometry.membranes, 1e-3
     direction = smooth_direction(membranes)
     # A displacement that closes the curve: the work of a force on an open one has end terms.
@@ -105,7 +105,7 @@ def test_forces_and_torques_balance() -> None:
 def test_the_jacobian_is_exact() -> None:
     """Against fourth-order differences, in every unknown."""
     scene = uneven_pair(numerics=Numerics(points=32))
-    state, geometry = initial_ellipses(scene), geometry_of(scene)
+    state, geometry = placed_state(scene), geometry_of(scene)
     membranes, bending, step = geometry.membranes, Bending(), 1e-3
 
     def force(shift: Array) -> Array:

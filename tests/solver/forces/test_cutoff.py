@@ -13,7 +13,7 @@ from solver.forces.adhesion import DirectAdhesion
 from solver.membrane.geometry import Geometry
 from solver.potentials.proximity import Closeness
 from solver.scene import Numerics, PowerLaw, Scene
-from solver.simulation.initial_state import initial_ellipses
+from solver.simulation.initial_state import placed_state
 from solver.simulation.simulate import simulate
 from tests.solver.scenes import geometry_of, shear_pair, smooth_direction, uneven_pair
 
@@ -86,7 +86,7 @@ def test_four_derivatives_are_continuous_at_the_ends_of_the_switch(end: float) -
 def test_the_force_is_minus_the_gradient_of_the_energy(exponents: tuple[int, int]) -> None:
     setting = scene(exponents=exponents)
     geometry = geometry_of(setting)
-    membranes, state, step = geometry.membranes, initial_ellipses(setting), 1e-3
+    membranes, state, step = geometry.membranes, placed_state(setting), 1e-3
     adhesion, direction = adhesion_of(setting), smooth_direction(membranes)
     around = [Geometry(membranes, state + k * step * direction) for k in (-2, -1, 1, 2)]
     weights = np.array([1, -8, 8, -1]) / (12 * step)
@@ -101,7 +101,7 @@ def test_the_force_is_minus_the_gradient_of_the_energy(exponents: tuple[int, int
 @pytest.mark.parametrize("setting", [scene(32), scene(96), shear_pair(1.0)], ids=["refined", "two", "image"])
 def test_the_jacobian_is_exact(setting: Scene) -> None:
     setting = setting.model_copy(update={"adhesion": parameters(cutoff=2.5)})
-    geometry, state, step = geometry_of(setting), initial_ellipses(setting), 1e-3
+    geometry, state, step = geometry_of(setting), placed_state(setting), 1e-3
     membranes, adhesion = geometry.membranes, adhesion_of(setting, 1e-6)
     jacobian = adhesion.jacobian(geometry, Closeness(geometry))
     for direction in (smooth_direction(membranes), np.eye(len(state))[-1]):

@@ -12,7 +12,7 @@ from solver.potentials.proximity import Closeness
 from solver.potentials.single_layer import SingleLayer
 from solver.potentials.viscosity_contrast import ViscosityContrast
 from solver.scene import Numerics, Scene, Vesicle
-from solver.simulation.initial_state import initial_ellipses
+from solver.simulation.initial_state import placed_state
 from tests.solver.scenes import geometry_of, smooth_direction, uneven_pair
 
 Array = NDArray[np.float64]
@@ -118,7 +118,7 @@ def test_the_mean_tension_of_a_circle_is_projected_out(contrast: float, points: 
 def test_the_inverse_of_another_geometry_changes_nothing_but_the_work() -> None:
     scene = uneven_pair()
     geometry = geometry_of(scene)
-    moved = Geometry(geometry.membranes, initial_ellipses(scene) + 0.3 * smooth_direction(geometry.membranes))
+    moved = Geometry(geometry.membranes, placed_state(scene) + 0.3 * smooth_direction(geometry.membranes))
     load = np.stack([moved.points[1], np.zeros_like(moved.points[1])])
     fresh, kept = Inextensibility(1e-12, ROUND_OFF), Inextensibility(1e-12, ROUND_OFF)
     inverse, _ = kept.factorize(layer_of(geometry), geometry)

@@ -13,7 +13,7 @@ from solver.integrators.control import root_mean_square
 from solver.motion.jacobian import DenseJacobian
 from solver.motion.terms import equation_of_motion
 from solver.scene import Numerics, Scene
-from solver.simulation.initial_state import initial_ellipses
+from solver.simulation.initial_state import placed_state
 from tests.solver.scenes import shear_pair
 from tests.solver.steps import FunctionEquation, all_steps
 from tests.solver.suspensions import suspension
@@ -69,7 +69,7 @@ def test_a_jacobian_that_is_wrong_is_seen_through() -> None:
 def final(scene: Scene, tolerance: float) -> tuple[Array, Array]:
     """Return the last state and its error."""
     equation = equation_of_motion(scene)
-    problem = InitialValueProblem(equation, initial_ellipses(scene), 0.0, scene.horizon)
+    problem = InitialValueProblem(equation, placed_state(scene), 0.0, scene.horizon)
     step = all_steps(BackwardDifferentiation(problem, tolerance), scene.horizon)[-1]
     assert step.error
     return step.state, step.error(scene.horizon)[:, 0]
@@ -88,6 +88,6 @@ def test_the_error_of_a_pair_is_found(hamaker: float, horizon: float) -> None:
 
 def test_an_approximate_jacobian_propagates_nothing() -> None:
     scene = suspension(7, horizon=0.1)
-    problem = InitialValueProblem(equation_of_motion(scene), initial_ellipses(scene), 0.0, 0.1)
+    problem = InitialValueProblem(equation_of_motion(scene), placed_state(scene), 0.0, 0.1)
     assert BackwardDifferentiation(problem, 1e-3).step().error is None
     assert DenseJacobian.exact

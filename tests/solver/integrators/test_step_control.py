@@ -11,7 +11,7 @@ from solver.integrators.control import AdaptiveStep, Attempt, ConservedError, Em
 from solver.integrators.one_step import OneStepIntegrator
 from solver.integrators.sdc import DeferredCorrection
 from solver.motion.terms import dense_equation
-from solver.simulation.initial_state import initial_ellipses
+from solver.simulation.initial_state import placed_state
 from tests.solver.scenes import uneven_pair
 from tests.solver.steps import EqualSteps, FunctionEquation, all_steps
 
@@ -55,7 +55,7 @@ def test_conserved_quantities_may_drift_in_proportion_to_the_step() -> None:
 
 def test_a_gap_in_a_curve_counts_the_same_wherever_the_vesicle_is() -> None:
     dynamics = dense_equation(uneven_pair())
-    state = initial_ellipses(uneven_pair())
+    state = placed_state(uneven_pair())
     state[:10] += 0.01
     far = state.copy()
     far[-4:] += 100.0

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from solver.membrane.geometry import Geometry, Membranes
 from solver.membrane.resampling import resampled_angle, resampled_state
 from solver.scene import Numerics, Vesicle
-from solver.simulation.initial_state import initial_ellipses
+from solver.simulation.initial_state import placed_state
 from tests.solver.scenes import uneven_pair
 
 Array = NDArray[np.float64]
@@ -42,6 +42,6 @@ def test_the_highest_mode_is_resampled_as_the_wave_it_is() -> None:
 
 def test_a_resampled_start_is_the_same_curve() -> None:
     coarse, fine = (Membranes.of_scene(uneven_pair(numerics=Numerics(points=n))) for n in (192, 384))
-    state = initial_ellipses(uneven_pair(numerics=Numerics(points=192)))
+    state = placed_state(uneven_pair(numerics=Numerics(points=192)))
     finer = Geometry(fine, resampled_state(coarse, state, fine))
     np.testing.assert_allclose(finer.points[:, :, ::2], Geometry(coarse, state).points, rtol=0, atol=1e-13)

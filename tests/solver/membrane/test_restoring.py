@@ -12,7 +12,7 @@ from solver.membrane.symmetry import independent_vesicles
 from solver.motion.equation import conserved_quantities
 from solver.motion.terms import dense_equation, summed_equation
 from solver.scene import Criteria, Numerics, Scene, Vesicle
-from solver.simulation.initial_state import initial_ellipses
+from solver.simulation.initial_state import placed_state
 from solver.simulation.simulate import simulate
 from tests.solver.scenes import shear_pair, smooth_direction, uneven_pair
 from tests.solver.suspensions import suspension
@@ -21,7 +21,7 @@ PAIR = uneven_pair(flow=Shear(rate=0.5), numerics=Numerics(points=48, tolerance=
 
 
 def test_deviations_decay_at_the_stated_rate() -> None:
-    equation, state = dense_equation(PAIR), initial_ellipses(PAIR)
+    equation, state = dense_equation(PAIR), placed_state(PAIR)
     membranes, restoring, step = equation.membranes, equation.restoring, 1e-4
     assert restoring
     state += 0.3 * smooth_direction(membranes, seed=5)
@@ -38,7 +38,7 @@ def test_deviations_decay_at_the_stated_rate() -> None:
 
 
 def test_the_derivative_is_exact_far_from_what_it_restores() -> None:
-    equation, state = dense_equation(PAIR), initial_ellipses(PAIR)
+    equation, state = dense_equation(PAIR), placed_state(PAIR)
     membranes, restoring, step = equation.membranes, equation.restoring, 1e-3
     assert restoring
     state += 0.3 * smooth_direction(membranes, seed=5)
@@ -56,7 +56,7 @@ def test_the_derivative_is_exact_far_from_what_it_restores() -> None:
 
 
 def test_a_closed_curve_of_the_right_area_is_left_alone() -> None:
-    equation, state = dense_equation(PAIR), initial_ellipses(PAIR)
+    equation, state = dense_equation(PAIR), placed_state(PAIR)
     assert equation.restoring
     rate = equation.restoring.rate(Geometry(equation.membranes, state))
     assert np.max(np.abs(rate)) < 1e-11
@@ -66,7 +66,7 @@ def test_a_closed_curve_of_the_right_area_is_left_alone() -> None:
 def test_next_to_a_circle_the_term_stays_small(reduced_area: float) -> None:
     """Whatever round-off makes of the shape: the area of a circle has no gradient to divide by."""
     scene = Scene(horizon=1.0, vesicles=(Vesicle(reduced_area=reduced_area),), flow=Shear(rate=1.0))
-    equation, state = dense_equation(scene), initial_ellipses(scene)
+    equation, state = dense_equation(scene), placed_state(scene)
     assert equation.restoring
     state = state + 1e-9 * smooth_direction(equation.membranes)
     assert np.max(np.abs(equation.restoring.rate(Geometry(equation.membranes, state)))) < 1e-7
@@ -74,7 +74,7 @@ def test_next_to_a_circle_the_term_stays_small(reduced_area: float) -> None:
 
 def test_a_vesicle_among_many_is_restored_like_one_of_few() -> None:
     scene = suspension(7)
-    few, many, state = dense_equation(scene), summed_equation(scene), initial_ellipses(scene)
+    few, many, state = dense_equation(scene), summed_equation(scene), placed_state(scene)
     state += 0.02 * smooth_direction(few.membranes)
     expected, found = few.motion(state).restoring, many.motion(state).restoring
     assert expected is not None

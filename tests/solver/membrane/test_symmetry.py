@@ -10,7 +10,7 @@ import pytest
 from solver.membrane.symmetry import has_images, independent_vesicles
 from solver.motion.terms import dense_equation
 from solver.scene import Extension, Numerics, PowerLaw, Scene, Shear, Start, Trap, Vesicle
-from solver.simulation.initial_state import initial_ellipses
+from solver.simulation.initial_state import placed_state
 from solver.simulation.simulate import simulate
 from tests.solver.scenes import shear_pair, smooth_direction
 
@@ -75,7 +75,7 @@ def test_the_rate_is_that_of_the_pair(flow: Shear | Extension | Trap | None) -> 
     rates = []
     for scene in (half, whole):
         dynamics = dense_equation(scene)
-        rate = dynamics.rate(initial_ellipses(scene))
+        rate = dynamics.rate(placed_state(scene))
         rates.append((dynamics.membranes.tangent_angle(rate)[0], dynamics.membranes.center(rate)[0]))
     for mine, theirs in zip(*rates, strict=True):
         np.testing.assert_allclose(mine, theirs, rtol=0, atol=2e-7 * np.max(np.abs(theirs)))
@@ -110,7 +110,7 @@ def test_a_relaxed_start_is_turned_with_its_image() -> None:
 @pytest.mark.parametrize("flow", FLOWS, ids=lambda flow: flow.kind if flow else "rest")
 def test_the_jacobian_follows_the_image(flow: Shear | Extension | Trap | None) -> None:
     scene = shear_pair(1.5, numerics={"points": 96, "tolerance": 1e-9}).model_copy(update={"flow": flow})
-    dynamics, state = dense_equation(scene), initial_ellipses(scene)
+    dynamics, state = dense_equation(scene), placed_state(scene)
     assert state.size == 98
     direction, size = smooth_direction(dynamics.membranes), 1e-4
     difference = (dynamics.rate(state + size * direction) - dynamics.rate(state - size * direction)) / (

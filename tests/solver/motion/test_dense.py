@@ -18,7 +18,7 @@ from solver.potentials import viscosity_contrast as contrast_module
 from solver.potentials.proximity import Closeness
 from solver.potentials.single_layer import SingleLayer
 from solver.scene import Extension, Numerics, PowerLaw, Scene, Shear, Trap, Vesicle
-from solver.simulation.initial_state import initial_ellipses
+from solver.simulation.initial_state import placed_state
 from tests.solver.scenes import smooth_direction, uneven_pair
 
 Array = NDArray[np.float64]
@@ -30,7 +30,7 @@ FLOWS = [None, Shear(rate=0.8), Extension(rate=0.3), Trap(rate=0.3)]
 def test_the_jacobian_is_exact(flow: Any) -> None:
     """Against fourth-order differences of the rate, along smooth changes of state."""
     scene = uneven_pair(flow=flow, numerics=Numerics(points=96, tolerance=1e-9))
-    dynamics, state, step = dense_equation(scene), initial_ellipses(scene), 1e-3
+    dynamics, state, step = dense_equation(scene), placed_state(scene), 1e-3
     membranes = dynamics.membranes
     state += 0.2 * smooth_direction(membranes, seed=5)
     jacobian = dynamics.jacobian(state)
@@ -51,7 +51,7 @@ def transformed(scene: Scene, state: Array, angle: float, shift: Array) -> Array
 
 def test_the_rate_of_a_turned_and_shifted_state_is_the_turned_rate() -> None:
     scene = uneven_pair(numerics=TIGHT)
-    state = initial_ellipses(scene)
+    state = placed_state(scene)
     there = transformed(scene, state, 0.9, np.array([5.0, -3.0]))
     membranes = dense_equation(scene).membranes
     rate, turned = dense_equation(scene).rate(state), dense_equation(scene).rate(there)
@@ -68,7 +68,7 @@ def test_the_rate_of_a_turned_and_shifted_state_is_the_turned_rate() -> None:
 @pytest.mark.parametrize("flow", FLOWS, ids=lambda flow: flow.kind if flow else "rest")
 def test_membranes_do_not_stretch_and_fluid_does_not_vanish(flow: Any) -> None:
     scene = uneven_pair(flow=flow, numerics=Numerics(points=128, tolerance=1e-9))
-    motion = dense_equation(scene).motion(initial_ellipses(scene))
+    motion = dense_equation(scene).motion(placed_state(scene))
     geometry = motion.geometry
     gradient = geometry.arclength_derivative(motion.velocity)
     scale = np.max(np.abs(gradient))
@@ -80,7 +80,7 @@ def test_membranes_do_not_stretch_and_fluid_does_not_vanish(flow: Any) -> None:
 def test_forces_feed_what_the_fluid_dissipates() -> None:
     """At rest −dE/dt, by differences along the motion, is the work of all forces on the fluid."""
     scene = uneven_pair(numerics=Numerics(points=128, tolerance=1e-9))
-    dynamics, state, step = dense_equation(scene), initial_ellipses(scene), 1e-4
+    dynamics, state, step = dense_equation(scene), placed_state(scene), 1e-4
     assert dynamics.adhesion
     rate = dynamics.rate(state)
     energy = []
@@ -152,7 +152,7 @@ def test_terms_that_a_scene_lacks_are_never_constructed(
 ) -> None:
     scene = Scene(horizon=1.0, **fields)
     dynamics = dense_equation(scene)
-    state = initial_ellipses(scene)
+    state = placed_state(scene)
     dynamics.rate(state)
     dynamics.jacobian(state)
     assert set(constructed) == expected
@@ -162,7 +162,7 @@ def test_the_terms_are_constructed_once_a_simulation(constructed: Counter[str]) 
     scene = uneven_pair(flow=Trap(rate=0.1))
     dynamics = dense_equation(scene)
     for _ in range(3):
-        dynamics.rate(initial_ellipses(scene))
+        dynamics.rate(placed_state(scene))
     assert constructed["DirectAdhesion"] == 1
 
 
@@ -177,7 +177,7 @@ def test_vesicles_far_apart_are_not_interpolated(monkeypatch: pytest.MonkeyPatch
 
     monkeypatch.setattr(SingleLayer, "assemble", spied)
     scene = Scene(horizon=1.0, vesicles=(Vesicle(center=(-4.0, 0.0)), Vesicle(center=(4.0, 0.0))))
-    dense_equation(scene).rate(initial_ellipses(scene))
+    dense_equation(scene).rate(placed_state(scene))
     assert calls == [(0, 64)]
 
 
@@ -192,7 +192,7 @@ def test_vesicles_far_apart_are_not_interpolated(monkeypatch: pytest.MonkeyPatch
 )
 def test_a_term_of_zero_strength_changes_round_off_only(zero: dict[str, Any]) -> None:
     without = uneven_pair(adhesion=None, numerics=TIGHT)
-    state = initial_ellipses(without)
+    state = placed_state(without)
     expected = dense_equation(without).rate(state)
     rate = dense_equation(without.model_copy(update=zero)).rate(state)
     np.testing.assert_allclose(rate, expected, rtol=0, atol=1e-13 * np.max(np.abs(expected)))

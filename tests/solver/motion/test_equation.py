@@ -13,7 +13,7 @@ from solver.motion.equation import EquationOfMotion
 from solver.motion.terms import dense_equation, summed_equation
 from solver.parallel import SERIAL
 from solver.scene import Numerics, Scene
-from solver.simulation.initial_state import initial_ellipses
+from solver.simulation.initial_state import placed_state
 from tests.solver.scenes import smooth_direction, uneven_pair, with_contrasts
 from tests.solver.suspensions import suspension
 
@@ -41,7 +41,7 @@ every_form = pytest.mark.parametrize(
 
 def states_of(scene: Scene, equation: EquationOfMotion, far: float) -> list[Array]:
     """Two of a run, and one so far from them that the search for its tension needs an inverse of its own."""
-    start = initial_ellipses(scene)
+    start = placed_state(scene)
     small, large = smooth_direction(equation.membranes, 1), smooth_direction(equation.membranes, 2)
     large[equation.membranes.count * equation.membranes.points :] = 0.0
     return [start, start + 0.01 * small, start + far * large]

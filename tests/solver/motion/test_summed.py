@@ -26,7 +26,7 @@ from solver.potentials.neighbors import Neighbors, gap
 from solver.potentials.proximity import Closeness
 from solver.potentials.refinement import LARGEST_REFINED
 from solver.scene import LARGEST_DENSE, Extension, Numerics, PowerLaw, Scene, Shear, Trap, Vesicle
-from solver.simulation.initial_state import initial_ellipses
+from solver.simulation.initial_state import placed_state
 from solver.simulation.simulate import simulate
 from tests.solver.steps import all_steps, equal_steps
 from tests.solver.suspensions import suspension
@@ -61,7 +61,7 @@ def close_together(points: int, **fields: Any) -> Scene:
 )
 def test_sums_and_matrices_give_the_same_motion(fields: dict[str, Any]) -> None:
     scene = close_together(64, **fields)
-    state = initial_ellipses(scene)
+    state = placed_state(scene)
     matrices, sums = dense_equation(scene), summed_equation(scene, SERIAL)
     expected, found = matrices.motion(state), sums.motion(state)
     assert found.closeness
@@ -86,7 +86,7 @@ def test_the_velocity_converges_spectrally_with_the_points() -> None:
 
     def centers(points: int) -> Array:
         scene = close_together(points, flow=Shear(rate=0.8))
-        return summed_equation(scene, SERIAL).rate(initial_ellipses(scene))[-10:]
+        return summed_equation(scene, SERIAL).rate(placed_state(scene))[-10:]
 
     exact = centers(256)
     errors = [np.max(np.abs(centers(points) - exact)) for points in (32, 64, 128)]
@@ -98,7 +98,7 @@ def test_the_velocity_converges_spectrally_with_the_points() -> None:
 def test_membranes_do_not_stretch() -> None:
     scene = suspension(8, 64, 1e-6)
     sums = summed_equation(scene, SERIAL)
-    motion = sums.motion(initial_ellipses(scene))
+    motion = sums.motion(placed_state(scene))
     gradient = motion.geometry.arclength_derivative(motion.velocity)
     stretching = np.sum(motion.geometry.tangents * gradient, axis=0)
     assert np.max(np.abs(stretching)) < 100 * sums.inextensibility.tolerance * np.max(np.abs(gradient))
@@ -106,7 +106,7 @@ def test_membranes_do_not_stretch() -> None:
 
 def test_the_last_tension_is_where_the_iteration_begins() -> None:
     scene = suspension(8)
-    sums, state = summed_equation(scene, SERIAL), initial_ellipses(scene)
+    sums, state = summed_equation(scene, SERIAL), placed_state(scene)
     sums.rate(state)
     first = sums.inextensibility.iterations
     rate = sums.rate(state)
@@ -121,7 +121,7 @@ def test_blocks_of_the_jacobian_are_those_of_vesicles_far_from_the_others() -> N
         Vesicle(reduced_area=0.8 + 0.05 * k, center=(40.0 * k, 1.0), angle=0.7 * k) for k in range(3)
     )
     scene = Scene(horizon=1.0, vesicles=vesicles, flow=Shear(rate=0.5))
-    state = initial_ellipses(scene)
+    state = placed_state(scene)
     exact, found = dense_equation(scene).jacobian(state), summed_equation(scene, SERIAL).jacobian(state)
     for members, block in zip(found.members, found.blocks, strict=True):
         expected = exact.matrix[np.ix_(members, members)]
@@ -135,7 +135,7 @@ def test_blocks_of_the_jacobian_are_those_of_vesicles_far_from_the_others() -> N
 def test_blocks_contain_how_others_draw_a_vesicle(cutoff: float | None) -> None:
     """Against differences of the adhesion force while one vesicle is shifted."""
     scene = suspension(4, 64, 1e-9, adhesion=PowerLaw(hamaker=1.0, distance=0.4, cutoff=cutoff))
-    sums, state, step = summed_equation(scene, SERIAL), initial_ellipses(scene), 1e-5
+    sums, state, step = summed_equation(scene, SERIAL), placed_state(scene), 1e-5
     assert sums.adhesion
     membranes = sums.membranes
 
@@ -154,7 +154,7 @@ def test_blocks_contain_how_others_draw_a_vesicle(cutoff: float | None) -> None:
 def scattered(count: int, points: int) -> Geometry:
     """A suspension, in which most vesicles are far from each other."""
     scene = suspension(count, points)
-    return Geometry(Membranes.of_scene(scene), initial_ellipses(scene))
+    return Geometry(Membranes.of_scene(scene), placed_state(scene))
 
 
 @pytest.mark.parametrize("accuracy", [1e-4, 1e-7, 1e-10])
@@ -202,7 +202,7 @@ def test_adhesion_between_far_vesicles_needs_few_of_their_points(
 
 def test_neighbors_are_those_found_among_all_pairs() -> None:
     scene = close_together(64)
-    geometry = Geometry(dense_equation(scene).membranes, initial_ellipses(scene))
+    geometry = Geometry(dense_equation(scene).membranes, placed_state(scene))
     everyone, near = Closeness(geometry), Neighbors(geometry, 6.0)
     expected = np.where(everyone.distances <= 6.0, everyone.distances, np.inf)
     found = np.full_like(expected, np.inf)
@@ -218,7 +218,7 @@ def test_the_gap_is_found_however_far_apart_vesicles_are(apart: float) -> None:
         for x, y in ((0.0, 0.0), (2 + apart, 0.0), (0.0, 3 + apart))
     )
     scene = Scene(horizon=1.0, vesicles=circles)
-    assert gap(Geometry(dense_equation(scene).membranes, initial_ellipses(scene))) == pytest.approx(
+    assert gap(Geometry(dense_equation(scene).membranes, placed_state(scene))) == pytest.approx(
         apart, rel=1e-3
     )
 
@@ -228,7 +228,7 @@ def test_the_gap_is_found_however_far_apart_vesicles_are(apart: float) -> None:
 
 def test_steps_with_blocks_converge_to_those_with_the_whole_jacobian() -> None:
     scene = suspension(4, 32, 1e-7)
-    state = initial_ellipses(scene)
+    state = placed_state(scene)
     whole = dense_equation(scene)
     exact = all_steps(BackwardDifferentiation(InitialValueProblem(whole, state, 0.0, 0.5), 1e-8), 0.5)[
         -1
@@ -246,7 +246,7 @@ def test_steps_with_blocks_converge_to_those_with_the_whole_jacobian() -> None:
 def test_deferred_correction_keeps_its_order_with_blocks() -> None:
     scene = suspension(4, 16, 1e-9, adhesion=None)
     sums = summed_equation(scene, SERIAL)
-    problem = InitialValueProblem(sums, initial_ellipses(scene), 0.0, 0.5)
+    problem = InitialValueProblem(sums, placed_state(scene), 0.0, 0.5)
     state = all_steps(BackwardDifferentiation(problem, 1e-4), 0.5)[-1].state
 
     def final(order: int, count: int) -> Array:
@@ -288,8 +288,8 @@ def test_terms_that_a_scene_lacks_are_never_constructed(monkeypatch: pytest.Monk
     monkeypatch.setattr(coarsened_adhesion, "DirectAdhesion", refuse)
     scene = suspension(LARGEST_DENSE + 1, adhesion=None, flow=None)
     sums = summed_equation(scene, SERIAL)
-    sums.rate(initial_ellipses(scene))
-    sums.jacobian(initial_ellipses(scene))
+    sums.rate(placed_state(scene))
+    sums.jacobian(placed_state(scene))
 
 
 @pytest.mark.parametrize(

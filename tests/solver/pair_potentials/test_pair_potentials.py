@@ -27,7 +27,7 @@ from solver.parallel import SERIAL
 from solver.potentials.neighbors import Neighbors
 from solver.potentials.proximity import Closeness, Proximity
 from solver.scene import LARGEST_DENSE, Numerics, Scene
-from solver.simulation.initial_state import initial_ellipses
+from solver.simulation.initial_state import placed_state
 from solver.simulation.simulate import simulate
 from tests.solver.scenes import smooth_direction, uneven_pair
 from tests.solver.suspensions import suspension
@@ -165,7 +165,7 @@ def test_the_force_of_a_new_potential_is_minus_the_gradient_of_its_energy(form: 
     """Work done along a deformation without stretching, against a fourth-order difference of the energy."""
     potential = Morse(**COMMON, cutoff=CUTOFF if form == "cutoff" else None)
     scene = uneven_pair(adhesion=None, numerics=Numerics(points=128))
-    membranes, state, step = Membranes.of_scene(scene), initial_ellipses(scene), 1e-3
+    membranes, state, step = Membranes.of_scene(scene), placed_state(scene), 1e-3
     adhesion: DirectAdhesion | CoarsenedAdhesion = DirectAdhesion(potential, 1e-10, membranes)
     if form == "coarsened":
         adhesion = CoarsenedAdhesion(potential, 1e-10, SERIAL)

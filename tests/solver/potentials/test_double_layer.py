@@ -11,7 +11,7 @@ from solver.potentials.double_layer import DoubleLayer
 from solver.potentials.proximity import Closeness
 from solver.potentials.single_layer import SingleLayer
 from solver.scene import Numerics, Scene, Vesicle
-from solver.simulation.initial_state import initial_ellipses
+from solver.simulation.initial_state import placed_state
 from tests.solver.references import Ellipse, integrate, nearest_parameter
 from tests.solver.scenes import closing, geometry_of, shear_pair, smooth_direction, uneven_pair
 
@@ -134,7 +134,7 @@ def test_images_carry_the_opposite() -> None:
 def test_the_jacobian_is_exact(scene: Scene) -> None:
     """Against fourth-order differences at a fixed density, along deformations that keep the curves closed."""
     scene = scene.model_copy(update={"numerics": Numerics(points=96)})
-    membranes, state, step = Membranes.of_scene(scene), initial_ellipses(scene), 1e-3
+    membranes, state, step = Membranes.of_scene(scene), placed_state(scene), 1e-3
     alpha = 2 * np.pi * np.arange(96) / 96
     phases = np.arange(membranes.count)[:, None]
     density = np.stack([np.exp(np.sin(alpha + phases)), np.cos(2 * alpha - phases)])

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from solver.analysis.run import Outcome
 from solver.motion.terms import dense_equation
 from solver.scene import Extension, Flow, Numerics, Scene, Shear, Trap, Vesicle
-from solver.simulation.initial_state import initial_ellipses
+from solver.simulation.initial_state import placed_state
 from solver.simulation.simulate import simulate
 from tests.solver.references import Ellipse
 from tests.solver.scenes import closing, shear_pair, smooth_direction, uneven_pair, with_contrasts
@@ -30,7 +30,7 @@ def vesicle(contrast: float, points: int = 64, flow: Flow | None = None, **field
 def test_the_flow_of_a_strained_drop(contrast: float) -> None:
     """The force 2(1 + λ)Ex on a unit circle moves it with Ex, a uniform strain inside."""
     dynamics = dense_equation(scene := vesicle(contrast, points=32, reduced_area=1.0))
-    geometry = dynamics.motion(initial_ellipses(scene)).geometry
+    geometry = dynamics.motion(placed_state(scene)).geometry
     assert dynamics.contrast
     strain = np.stack([geometry.points[0], -geometry.points[1]])
     force = 2 * (1 + contrast) * strain * geometry.membranes.spacing[:, None]
@@ -42,7 +42,7 @@ def reciprocity_error(points: int) -> float:
     """How much the work of one set of forces in the flow of another depends on which is which."""
     scene = with_contrasts(uneven_pair(numerics=Numerics(points=points, tolerance=1e-9)), 6.0, 0.2)
     dynamics = dense_equation(scene)
-    geometry = dynamics.motion(initial_ellipses(scene)).geometry
+    geometry = dynamics.motion(placed_state(scene)).geometry
     assert dynamics.contrast
     alpha = 2 * np.pi * np.arange(points) / points + np.zeros((2, 1))
     weights = geometry.membranes.spacing[:, None]
@@ -65,7 +65,7 @@ def test_the_mobility_is_reciprocal_with_spectral_accuracy() -> None:
 def test_a_very_viscous_vesicle_turns_as_a_rigid_ellipse(angle: float) -> None:
     """Jeffery (Proc. R. Soc. A 102, 161, 1922), in two dimensions."""
     scene = vesicle(1e7, flow=Shear(rate=0.7), reduced_area=0.8, angle=angle)
-    motion = dense_equation(scene).motion(initial_ellipses(scene))
+    motion = dense_equation(scene).motion(placed_state(scene))
     ellipse = Ellipse.of(0.8, 2 * np.pi)
     a2, b2 = ellipse.major**2, ellipse.minor**2
     rate = -0.7 * (a2 * np.sin(angle) ** 2 + b2 * np.cos(angle) ** 2) / (a2 + b2)
@@ -97,7 +97,7 @@ def test_a_circular_vesicle_is_as_viscous_as_a_rigid_disk(contrast: float) -> No
 def test_the_stress_is_that_of_the_far_flow() -> None:
     """Far away the disturbance is that of a stresslet: x (x·M·x)/(2πr⁴), M_xy the mean shear stress."""
     scene = vesicle(5.0, points=96, flow=Shear(rate=1.0), reduced_area=0.7, angle=0.9)
-    motion = (dynamics := dense_equation(scene)).motion(initial_ellipses(scene))
+    motion = (dynamics := dense_equation(scene)).motion(placed_state(scene))
     geometry = motion.geometry
     force = motion.bending + geometry.arclength_derivative(motion.tension * geometry.tangents)
     assert dynamics.contrast
@@ -127,7 +127,7 @@ def test_the_stress_is_that_of_the_far_flow() -> None:
 def test_the_jacobian_is_exact(flow: Flow | None, contrasts: tuple[float, float]) -> None:
     """Against fourth-order differences of the rate, along smooth changes that keep the curves closed."""
     scene = with_contrasts(uneven_pair(flow=flow, numerics=Numerics(points=128, tolerance=1e-9)), *contrasts)
-    dynamics, state, step = dense_equation(scene), initial_ellipses(scene), 1e-3
+    dynamics, state, step = dense_equation(scene), placed_state(scene), 1e-3
     jacobian = dynamics.jacobian(state)
     for direction in (smooth_direction(dynamics.membranes, 0), np.eye(len(state))[-3]):
         direction = closing(dynamics.membranes, state, direction)
@@ -138,7 +138,7 @@ def test_the_jacobian_is_exact(flow: Flow | None, contrasts: tuple[float, float]
 
 def test_a_contrast_of_next_to_one_is_next_to_none() -> None:
     scene = uneven_pair(flow=Shear(rate=0.5), numerics=Numerics(tolerance=1e-9))
-    state = initial_ellipses(scene)
+    state = placed_state(scene)
     expected = dense_equation(scene).rate(state)
     rate = dense_equation(with_contrasts(scene, 1 + 1e-12, 1.0)).rate(state)
     np.testing.assert_allclose(rate, expected, rtol=0, atol=1e-9 * np.max(np.abs(expected)))
@@ -154,7 +154,7 @@ def test_close_vesicles_of_unequal_viscosities_are_resolved() -> None:
         near = second.model_copy(update={"center": (0.38, -0.2)})
         scene = scene.model_copy(update={"vesicles": (first, near), "adhesion": None})
         dynamics = dense_equation(scene)
-        motion = dynamics.motion(initial_ellipses(scene))
+        motion = dynamics.motion(placed_state(scene))
         assert motion.closeness is not None
         rates.append((motion.closeness.nearest, motion.velocity[:, :, :: points // 128]))
     (gap, coarse), (_, fine) = rates

@@ -9,7 +9,7 @@ from solver.analysis.run import LARGEST_SPATIAL, Outcome, Run
 from solver.membrane.geometry import Geometry, Membranes
 from solver.potentials.neighbors import gap
 from solver.scene import Numerics, PowerLaw, Scene, Shear, Start, Trap, Vesicle
-from solver.simulation.initial_state import initial_ellipses
+from solver.simulation.initial_state import placed_state
 from solver.simulation.simulate import simulate
 
 
@@ -29,7 +29,7 @@ def check_start(run: Run) -> None:
     assert run.error.spatial > LARGEST_SPATIAL
     assert run.error.area < 1e-12
     assert run.error.temporal == 0.0
-    geometry = Geometry(Membranes.of_scene(run.scene), initial_ellipses(run.scene))
+    geometry = Geometry(Membranes.of_scene(run.scene), placed_state(run.scene))
     count = len(run.scene.vesicles)
     assert run.frames.tangent_angle.shape == (1, count, 64)
     np.testing.assert_array_equal(run.frames.tangent_angle[0, 0], geometry.tangent_angle[0])
@@ -63,7 +63,7 @@ def test_a_pair(equal: bool) -> None:
         scene = pair(vesicles=(scene.vesicles[0], slender(center=(1.5, 0.0), bending_modulus=2.0)))
     run = simulate(scene)
     check_start(run)
-    geometry = Geometry(Membranes.of_scene(scene), initial_ellipses(scene))
+    geometry = Geometry(Membranes.of_scene(scene), placed_state(scene))
     assert run.gap == gap(geometry)
     assert run.energy.adhesion is not None
     assert np.isnan(run.energy.adhesion)

@@ -11,7 +11,7 @@ from solver.integrators import InitialValueProblem
 from solver.integrators.bdf import BackwardDifferentiation
 from solver.motion.terms import dense_equation
 from solver.scene import Criteria, Numerics, PowerLaw, Scene, Vesicle
-from solver.simulation.initial_state import initial_ellipses
+from solver.simulation.initial_state import placed_state
 from solver.simulation.simulate import simulate
 from tests.solver.scenes import uneven_pair
 
@@ -56,7 +56,7 @@ def test_an_uneven_pair_moves_as_it_does_in_a_frame_at_rest() -> None:
     scene = shifted(scene, (1.0, 0.1))
     run = simulate(scene)
     equation = dense_equation(scene)
-    problem = InitialValueProblem(equation, initial_ellipses(scene), 0.0, 6.0)
+    problem = InitialValueProblem(equation, placed_state(scene), 0.0, 6.0)
     integrator, time = BackwardDifferentiation(problem, 1e-8), 0.0
     while time < 6.0:
         step = integrator.step()

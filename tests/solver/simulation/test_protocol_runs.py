@@ -20,7 +20,7 @@ from solver.motion.terms import equation_of_motion
 from solver.motion.timed import TimedEquation, with_clock
 from solver.protocols import Ramp, RateProtocol, Sine, Steps
 from solver.scene import Numerics, Scene, Vesicle
-from solver.simulation.initial_state import initial_ellipses
+from solver.simulation.initial_state import placed_state
 from solver.simulation.simulate import simulate
 from tests.solver.scenes import shear_pair, smooth_direction, uneven_pair
 from tests.solver.steps import equal_steps, sheared_pair
@@ -65,7 +65,7 @@ def test_the_jacobian_knows_the_time(protocol: RateProtocol, count: int) -> None
     scene = uneven_pair(flow=Shear(rate=0.5)) if count == 2 else suspension(count)
     scene = changing(scene, protocol, numerics=Numerics(points=32, tolerance=1e-9))
     equation, time, step = equation_of_motion(scene, time=1.0), 1.2, 1e-3
-    state = initial_ellipses(scene)
+    state = placed_state(scene)
     later, earlier = (equation.rate(with_clock(state, time + shift)) for shift in (step, -step))
     alone = np.append(np.zeros(state.size), 1.0)
     claimed = equation.jacobian(with_clock(state, time)) @ alone
@@ -75,7 +75,7 @@ def test_the_jacobian_knows_the_time(protocol: RateProtocol, count: int) -> None
 
 def test_the_jacobian_solves_what_it_multiplies() -> None:
     scene = changing(uneven_pair(flow=Shear(rate=0.5)), SINE, numerics=Numerics(points=32))
-    equation, state = equation_of_motion(scene), with_clock(initial_ellipses(scene), 0.4)
+    equation, state = equation_of_motion(scene), with_clock(placed_state(scene), 0.4)
     direction = with_clock(smooth_direction(equation.membranes), 0.7)
     jacobian = equation.jacobian(state)
     right = direction - 0.3 * (jacobian @ direction)

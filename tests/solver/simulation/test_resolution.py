@@ -21,7 +21,7 @@ from solver.motion.terms import dense_equation
 from solver.parallel import Parallel
 from solver.scene import Criteria, Numerics, Output, PowerLaw, Shear, Start, Trap, Vesicle
 from solver.simulation import simulate as simulate_module
-from solver.simulation.initial_state import initial_ellipses
+from solver.simulation.initial_state import placed_state
 from solver.simulation.resolution import (
     LADDER,
     AdaptiveResolution,
@@ -145,7 +145,7 @@ def test_the_ladder_has_an_end() -> None:
 def rough(scene: Scene, points: int, amplitude: float) -> tuple[Membranes, Array]:
     """The start with a wave of this amplitude in the last third of the tangent angle's spectrum."""
     given = with_points(scene, points)
-    membranes, state = Membranes.of_scene(given), initial_ellipses(given)
+    membranes, state = Membranes.of_scene(given), placed_state(given)
     alpha = 2 * np.pi * np.arange(points) / points
     wave = np.tile(amplitude * np.cos((points // 2 - 2) * alpha), membranes.count)
     state[: wave.size] += wave

@@ -13,7 +13,7 @@ from solver.membrane.resampling import resampled_angle
 from solver.motion.equation import conserved_quantities
 from solver.motion.terms import accurate_equation
 from solver.scene import Numerics, PowerLaw, Scene, Shear, Start, Trap, Vesicle
-from solver.simulation.initial_state import initial_ellipses
+from solver.simulation.initial_state import placed_state
 from solver.simulation.resolution import with_points
 from solver.simulation.simulate import simulate
 from solver.simulation.steady_scenes import Shapes, SteadyBranch, find_steady_state, follow_steady_states
@@ -65,7 +65,7 @@ def finer(shapes: Shapes, points: int) -> Shapes:
 
 def test_determining_rows_are_the_derivatives_of_what_is_kept() -> None:
     scene = uneven_pair(numerics=Numerics(points=48))
-    equations, state = equations_of(scene), initial_ellipses(scene)
+    equations, state = equations_of(scene), placed_state(scene)
     rows = equations.determining_rows(state)[: 3 * 2]
     change = np.random.default_rng(1).standard_normal(state.size)
 

@@ -1,0 +1,66 @@
+"""Membranes through points: length, area and shape of curves that are known, however the points lie."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.special import ellipe
+
+from solver.membrane import curve
+from solver.membrane.traced_curve import traced_curve
+
+Array = NDArray[np.float64]
+
+
+def ellipse(count: int, uneven: float = 0.4) -> Array:
+    """Points of an ellipse with semiaxes 2 and 1 about (3, -1), at uneven distances."""
+    angle = 2 * np.pi * np.arange(count) / count
+    angle = angle + uneven * np.sin(angle)
+    return np.column_stack([3 + 2 * np.cos(angle), -1 + np.sin(angle)])
+
+
+LENGTH = 8 * ellipe(0.75)
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+@pytest.mark.parametrize("repeated", [False, True])
+def test_an_ellipse(backwards: bool, repeated: bool) -> None:
+    points = ellipse(100)
+    points = np.concatenate([points, points[:1]]) if repeated else points
+    found = traced_curve(points[::-1] if backwards else points)
+    assert found.length == pytest.approx(LENGTH, rel=1e-6)
+    assert found.reduced_area == pytest.approx(8 * np.pi**2 / LENGTH**2, rel=1e-5)
+    np.testing.assert_allclose(found.center, [3, -1], atol=1e-5)
+    assert found.tangent_angle.size == 100
+    assert found.distance < 1e-4
+    x, y = curve.positions(found.tangent_angle, found.center, found.length)
+    np.testing.assert_allclose(((x - 3) / 2) ** 2 + (y + 1) ** 2, 1, atol=1e-4)
+    assert curve.closure(curve.tangents(found.tangent_angle)) < 1e-13
+
+
+def test_more_points_are_nearer() -> None:
+    errors = [abs(traced_curve(ellipse(count)).length - LENGTH) for count in (20, 40, 80)]
+    assert np.all(np.log2(np.array(errors[:-1]) / errors[1:]) > 3)
+
+
+def test_the_distance_says_what_is_smoothed_away() -> None:
+    """Points off the curve by turns are a wave that is too short for them."""
+    points = ellipse(64, uneven=0.0)
+    points[::2] += 0.01 * (points[::2] - [3, -1])
+    assert 0.002 < traced_curve(points).distance < 0.05
+
+
+@pytest.mark.parametrize(
+    ("points", "message"),
+    [
+        (ellipse(7), "at least 8 different points are needed, got 7"),
+        (np.zeros((20, 3)), r"two columns, x and y, got shape \(20, 3\)"),
+        (np.full((20, 2), np.nan), "finite"),
+        (np.repeat(ellipse(20), 2, axis=0), "neighboring points must differ"),
+        (ellipse(20)[np.arange(20) * 7 % 20], "not in order along a simple closed curve"),
+    ],
+)
+def test_bad_points_are_refused(points: Array, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        traced_curve(points)
