@@ -11,13 +11,14 @@ from solver.model import Model, Positive
 
 
 class RandomWaves(Model):
-    """Random long waves on the membranes, which break every symmetry.  Equal seeds make equal ones.
+    """Random long waves on the membranes, which break every symmetry.
 
     Attributes
     ----------
     amplitude : float
         Root mean square of the change of tangent angles, radians.
     seed : int
+        Equal seeds make equal waves.
     waves : int
         The most waves on a membrane.
     """
