@@ -58,7 +58,8 @@ export function startRouter(routes) {
       await route.show({ content, query, signal, parameters: { ...route.path.exec(path)?.groups } });
     } catch (error) {
       if (!signal.aborted) {
-        content.append(alertAbout(error), wayBack(route.section));
+        const title = content.querySelector("h1") ? "" : element("h1", {}, "This cannot be shown");
+        content.append(title, alertAbout(error), wayBack(route.section));
       }
     }
   }

@@ -14,6 +14,7 @@ import h5netcdf
 import httpx2
 import numpy as np
 import pytest
+from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, ConsoleMessage, Page, Response, expect, sync_playwright
 
 from api.auth import TokenScope
@@ -113,6 +114,13 @@ def page(browser: Browser) -> Iterator[Page]:
         opened.on("pageerror", lambda error: failures.append(str(error)))
         yield opened
         assert not failures
+
+
+def assert_accessible(page: Page) -> None:
+    """What axe-core checks: contrast, names, roles, labels, landmarks, headings."""
+    page.evaluate("document.querySelectorAll('details').forEach(part => part.open = true)")
+    found = Axe().run(page).response["violations"]
+    assert [(each["id"], [node["target"] for node in each["nodes"]]) for each in found] == []
 
 
 def count(page: Page, outcome: str) -> int:
@@ -508,7 +516,10 @@ def test_flow_potential_and_integrator_are_chosen_from_menus(page: Page, url: st
 def test_addresses_without_a_view_lead_back(page: Page, url: str) -> None:
     for address, way in (("nowhere", "boundaries"), ("runs/" + 32 * "0", "runs"), ("jobs/none", "jobs")):
         page.goto(f"{url}/#/{address}")
-        page.get_by_role("link", name=f"Back to {way}").click()
+        back = page.get_by_role("link", name=f"Back to {way}")
+        expect(back).to_be_visible()
+        assert_accessible(page)
+        back.click()
         expect(page.locator("nav [aria-current]")).to_have_text(way.capitalize())
 
 
@@ -556,6 +567,7 @@ def test_an_empty_store_says_so_and_has_a_beginning(page: Page, tmp_path: Path) 
     with serving(tmp_path / "store") as url:
         page.goto(url)
         expect(page.locator("main")).to_contain_text("Nothing is stored yet.")
+        assert_accessible(page)
         page.get_by_role("button", name="Trace the first boundary").click()
         expect(page.get_by_role("heading", level=1)).to_have_text("Critical hamaker")
         page.goto(f"{url}/#/runs")
@@ -574,10 +586,12 @@ def test_a_report_is_shown_with_its_contents(page: Page, url: str, store: Path) 
     text = "# Made up\n\n- It holds.\n\n" + "".join(f"## Part {i}\n\n{'text ' * 2000}\n\n" for i in (1, 2))
     (directory / PAGE).write_text(report_page(text, directory), encoding="utf-8")
     page.reload()
+    assert_accessible(page)
     page.get_by_role("link", name="symmetry of bound pairs").click()
     report = page.frame_locator("iframe")
     report.get_by_role("link", name="Part 2").click()
     expect(report.get_by_role("heading", name="Part 2")).to_be_in_viewport()
+    assert_accessible(page)
 
 
 def test_a_job_is_canceled(page: Page, url: str) -> None:
@@ -623,6 +637,7 @@ def test_the_page_asks_for_a_token_if_one_is_required(page: Page, store: Path, t
     with serving(guarded) as url:
         page.goto(url)
         expect(page.get_by_role("dialog")).to_contain_text("requires a token")
+        assert_accessible(page)
         page.get_by_label("Token", exact=True).fill("wrong")
         page.keyboard.press("Enter")
         expect(page.get_by_role("dialog")).to_contain_text("does not accept this token")
@@ -661,6 +676,7 @@ def test_every_view_fits_keeps_its_policy_and_loads_nothing_from_elsewhere(
                 page.locator(".plot .main-svg").first.wait_for()
             assert page.evaluate("document.documentElement.scrollWidth") <= viewport["width"], view
             assert page.evaluate("violations") == [], view
+            assert_accessible(page)
         background = "getComputedStyle(document.body).backgroundColor"
         channels = [int(value) for value in re.findall(r"\d+", page.evaluate(background))]
         assert (sum(channels) < 3 * 64) == (scheme == "dark")

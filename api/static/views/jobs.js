@@ -8,7 +8,7 @@ import { alertAbout } from "../problems.js";
 
 /** @typedef {import("../job.js").Job} Job */
 
-const COLUMNS = ["Job", "Status", "Progress", "Submitted", "Result", ""];
+const COLUMNS = ["Job", "Status", "Progress", "Submitted", "Result", "Action"];
 const SECONDS_BETWEEN_REQUESTS = 1;
 
 /** @param {import("../router.js").Place} place */

@@ -51,5 +51,8 @@ export async function showReport({ content, parameters, signal }) {
   const page = await getText(`/reports/${parameters.name}`, signal);
   const address = URL.createObjectURL(new Blob([page], { type: "text/html" }));
   signal.addEventListener("abort", () => URL.revokeObjectURL(address));
-  content.replaceChildren(element("iframe", { class: "report", title, sandbox: "allow-same-origin", src: address }));
+  content.replaceChildren(
+    element("div", { class: "heading" }, element("h1", {}, title)),
+    element("iframe", { class: "report", title, sandbox: "allow-same-origin", src: address }),
+  );
 }

@@ -9,7 +9,7 @@ import { alertAbout } from "../problems.js";
 import { goTo } from "../router.js";
 import { describe } from "../symbols.js";
 
-const COLUMNS = ["Outcome", "Scene", "Integrator", "Points", "Time", "Made", ""];
+const COLUMNS = ["Outcome", "Scene", "Integrator", "Points", "Time", "Made", "Run"];
 
 /** @param {import("../router.js").Place} place */
 export async function showRuns({ content, query, signal }) {
