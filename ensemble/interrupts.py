@@ -131,4 +131,4 @@ def _say_interrupted() -> None:
     stream = sys.__stderr__
     if launched_rank() == 0 and stream is not None:
         print(SHOW_CURSOR if stream.isatty() else "", file=stream, end="")
-        tell("interrupted; what is finished or has a checkpoint is kept, and the same command goes on")
+        tell("interrupted; what is in the store is kept, and the same command goes on from there")

@@ -42,7 +42,8 @@ def bisect(  # numpydoc ignore=PR01
     """Trace a boundary, on all ranks, running only what the store does not have.
 
     Each rank makes runs of its own unless ranks are asked to share them.  The exit status is 0 if every
-    search converged and every bracket that was to be certified is, else 4.
+    search converged and every bracket that was to be certified is, else 4.  The first Ctrl-C keeps runs in
+    progress and ends with status 75; the same command goes on.
     """
     if tolerance is not None:
         changes = [*changes, f"search.tolerance={tolerance!r}"]
@@ -65,7 +66,8 @@ def run(  # numpydoc ignore=PR01
 ) -> None:
     """Simulate one scene on all ranks together, unless the store has the run.
 
-    The exit status is 4 if it failed numerically.
+    The exit status is 4 if it failed numerically.  The first Ctrl-C keeps the run as far as it has come and
+    ends with status 75; the same command goes on.
     """
     if again and not no_store:
         _set_aside(scene, changes, store)
