@@ -93,8 +93,11 @@ class CheckpointKeeper:
         order = self._order()
         if order is Order.GO_ON and now >= self._next_checkpoint:
             return Order.KEEP
-        if order is Order.CANCEL and not self._was_kept:  # that of another command is not this one's to drop
-            self._checkpoint.remove()
+        if order is Order.CANCEL:
+            if self._was_kept:  # that of another command is not this one's to drop
+                self._checkpoint.leave()
+            else:
+                self._checkpoint.remove()
         return order
 
     def write(self, saved: Saved, began: float) -> None:

@@ -81,10 +81,14 @@ class Checkpoint:
         path.parent.mkdir(exist_ok=True)
         unfinished = self._own_directory() / path.name
         self.record.write()
-        scene = self._scene.model_dump_json()
-        content = {"scene": scene, "simulation": saved, "record": self.record.saved()}
+        writer = self._own_directory().name
+        content = {
+            "scene": self._scene.model_dump_json(),
+            "simulation": saved,
+            "record": {"writer": writer, "counts": self.record.counts},
+        }
         try:
-            write_plain(unfinished, content, self._attributes() | {"writer": self._own_directory().name})
+            write_plain(unfinished, content, self._attributes() | {"writer": writer})
             flush(unfinished)
             unfinished.replace(path)
         finally:
@@ -122,7 +126,7 @@ class Checkpoint:
             raise StoreError(f"it is damaged ({error})") from error
         if not isinstance(content, dict) or "record" not in content:
             raise StoreError("an earlier version wrote it")
-        self.record.take_over(content["record"])
+        self.record.take_over(**content["record"])
         saved: Saved = content["simulation"]
         return saved
 
@@ -130,6 +134,11 @@ class Checkpoint:
         """Remove it, and what this process has recorded."""
         self.record.remove()
         remove_checkpoint(self._store, self.key)
+
+    def leave(self) -> None:
+        """Leave it to others, and remove what this process has recorded unless it counts that."""
+        if _writer_of_checkpoint(self._store, self.key) != self._own_directory().name:
+            self.record.remove()
 
     def _attributes(self) -> dict[str, str | int]:
         return {"key": self.key, "results_revision": RESULTS_REVISION}

@@ -24,7 +24,6 @@ from ensemble.disk import flush
 from ensemble.errors import StoreError
 from solver.analysis.record import FRAMES, Block, Sink, with_points
 from solver.analysis.run import Array
-from solver.memory import Saved
 
 _CACHED = 16  # blocks, while arrays are read one after the other
 
@@ -96,22 +95,15 @@ class RecordedBlocks(Sink):
         if places:
             flush(self._directory)
 
-    def saved(self) -> Saved:
-        """Return how many blocks there are, and whose; see `Sink`.
-
-        Returns
-        -------
-        dict
-        """
-        return {**super().saved(), "writer": self._directory.name}
-
-    def take_over(self, saved: Saved) -> None:
+    def take_over(self, writer: str, counts: Mapping[str, int]) -> None:
         """Make the blocks of a process that has ended, or of this one, the own ones.
 
         Parameters
         ----------
-        saved : dict
-            What that process saved of its blocks.
+        writer : str
+            Name of the directory of that process.
+        counts : mapping of str to int
+            How many blocks there are of each part.
 
         Raises
         ------
@@ -120,9 +112,9 @@ class RecordedBlocks(Sink):
         """
         from ensemble.store.plain_hdf5 import UnreadableFileError, read_plain
 
-        source = self._place / saved["writer"]
+        source = self._place / writer
         try:
-            for part, count in saved["counts"].items():
+            for part, count in counts.items():
                 for number in range(count):
                     path = source / _name(part, number)
                     read_plain(path)

@@ -131,6 +131,20 @@ def test_the_blocks_of_a_process_that_lives_are_its_own(store: Store) -> None:
     assert not any((store.path / CHECKPOINTS).iterdir())
 
 
+def test_a_canceled_run_leaves_what_the_checkpoint_counts_only(store: Store) -> None:
+    cut(store.path, LONG)
+    (first,) = directories(store.path, LONG)
+    simulation, checkpoint = begun(store, LONG, 12)
+    checkpoint.record.write()
+    checkpoint.leave()
+    assert directories(store.path, LONG) == {first}
+    simulation, checkpoint = begun(store, LONG, 12)
+    checkpoint.write(simulation.saved())
+    checkpoint.leave()
+    assert len(directories(store.path, LONG)) == 1
+    assert arrays_of(finished(store, LONG)) == arrays_of(simulate(LONG))
+
+
 @pytest.mark.parametrize("damage", ["missing", "torn"])
 def test_a_run_without_all_of_its_record_does_not_go_on(store: Store, damage: str) -> None:
     cut(store.path, LONG)
