@@ -26,9 +26,7 @@ ARGUMENTS = (
 def largest_checkpoint(store: Path) -> int:
     """Return the size of the checkpoints that there are now, in bytes."""
     try:
-        return max(
-            (checkpoint_path(store, key).stat().st_size for key in checkpointed_keys(store)), default=0
-        )
+        sizes = [checkpoint_path(store, key).stat().st_size for key in checkpointed_keys(store)]
     except FileNotFoundError:  # its run has just been committed
         return 0
     return max(sizes, default=0)
