@@ -9,7 +9,7 @@ The parts, from the lowest to the highest. Each imports only parts that stand be
 4. `auth`: tokens and who makes a request
 5. `jobs`: submissions, their cost, and the queue
 6. `results`: stored runs and boundaries as clients read them
-7. `worker`: carries out jobs with `mpirun`
+7. `worker`: carries out jobs with `mpirun` or Slurm
 8. `client`: the same from Python
 9. `routes`: what the service answers, one module for each resource, and the web page (`static`)
 10. `app`: all routes and the middleware in one application

@@ -59,6 +59,7 @@ def worker(  # numpydoc ignore=PR01
 
     from api.database.service_database import Database
     from api.jobs.job_queue import Jobs
+    from api.worker.launchers import LAUNCHERS
     from api.worker.worker import Worker
     from ensemble.store import Store
 
@@ -75,8 +76,9 @@ def worker(  # numpydoc ignore=PR01
     if end_with_input:
         threading.Thread(target=wait_for_end_of_input, daemon=True).start()
     settings = _settings(store)
+    launcher = LAUNCHERS[settings.launcher](settings)
     with Store.open(store) as opened, Database.open(settings.database_url, opened.path) as database:
-        Worker(Jobs(database, opened.path), opened, settings.maximum_memory).run(stop)
+        Worker(Jobs(database, opened.path), opened, settings.maximum_memory, launcher).run(stop)
 
 
 def token(  # numpydoc ignore=PR01

@@ -30,6 +30,7 @@ from api.jobs.submissions import Submissions, job_limits
 from api.results.downloads import Downloads
 from api.routes.service import Service
 from api.settings import Settings
+from api.worker.launchers import LAUNCHERS
 from ensemble.config.documents import preset_names
 from ensemble.errors import BadInput
 from ensemble.questions import preset_question
@@ -61,9 +62,11 @@ def serve(settings: Settings, host: str, port: int, workers: int) -> None:
     Raises
     ------
     BadInput
-        If the store or the database cannot be used, or if other machines reach the address and there are no
-        tokens.
+        If the store, the database or the launcher of jobs cannot be used, or if other machines reach the
+        address and there are no tokens.
     """
+    if workers:
+        LAUNCHERS[settings.launcher](settings)
     with open_service(settings) as service:
         if not service.tokens.have_existed() and not is_loopback(host):
             raise BadInput(

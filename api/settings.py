@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from ipaddress import ip_network
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
 from pydantic_settings import BaseSettings, SettingsConfigDict
@@ -75,6 +75,15 @@ class Settings(BaseSettings):
         default_factory=_physical_memory,
         ge=1 << 29,
         description="Most memory of a job, in bytes, over all its processes; each gets an equal part.",
+    )
+
+    launcher: Literal["mpirun", "slurm"] = Field(
+        "mpirun",
+        description="What starts the ranks of a job: `mpirun` here, or `slurm`, which submits each job to a "
+        "cluster.",
+    )
+    slurm_options: str = Field(
+        "", description="Further options of `sbatch`, such as `--partition=long --mem-per-cpu=2G`."
     )
 
     body_bytes: int = Field(1 << 18, ge=1, description="Largest body of a request, in bytes.")

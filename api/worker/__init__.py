@@ -1,1 +1,1 @@
-"""The worker: leases jobs and carries each out with one `mpirun`."""
+"""The worker: leases jobs and has a launcher, such as `mpirun`, carry each out."""

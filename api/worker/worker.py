@@ -1,4 +1,4 @@
-"""The worker: leases one job after the other and has `mpirun` carry it out.
+"""The worker: leases one job after the other and has a launcher carry it out.
 
 Only what a command prints as its answer, with the status of an answer, decides a job.  Every other end is
 trouble, and the job is tried again: its processes were killed, or the disk, the database or the memory failed
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import logging
+import math
 import signal
 import threading
 import time
@@ -24,7 +25,8 @@ from api.jobs.job_queue import Jobs
 from api.jobs.worker_identity import own_identity
 from api.worker.delays import growing_delay
 from api.worker.job_log import JobLog
-from api.worker.mpirun import Process, mpirun_command
+from api.worker.job_process import Process
+from api.worker.launchers.launcher import TIME_LIMIT_STATUS, JobAttempt, Launcher
 from ensemble.errors import SUSPENDED_STATUS
 from ensemble.questions import INCOMPLETE_STATUS, kind_named
 from ensemble.store import Store
@@ -74,12 +76,15 @@ class Worker:
         It keeps runs and answers.
     memory : int
         Bytes that the processes of a job may use together.
+    launcher : Launcher
+        Starts the ranks of a job.
     """
 
-    def __init__(self, jobs: Jobs, store: Store, memory: int) -> None:
+    def __init__(self, jobs: Jobs, store: Store, memory: int, launcher: Launcher) -> None:
         self._jobs = jobs
         self._store = store
         self._memory = memory
+        self._launcher = launcher
         self._identity = own_identity()
         self._has_seen_outage = False  # during the present attempt
         self._futile: Counter[str] = Counter()  # attempts here since a job last came further, by its id
@@ -117,7 +122,8 @@ class Worker:
         log.info("job %s: attempt %d", job.id, job.attempts)
         self._has_seen_outage = False
         try:
-            command = mpirun_command(job.ranks, self._memory // job.ranks, self._arguments(lease))
+            attempt = self._attempt(lease)
+            command = self._launcher.command(attempt)
         except OSError as error:
             self._futile[job.id] += 1
             self._try_again_later(lease, stop, f"could not be started ({error.strerror})")
@@ -126,6 +132,11 @@ class Worker:
         with Process(command, self._log(lease)) as process:
             status = self._wait(process, lease, stop)
             if status is None:
+                process.end()
+                self._launcher.end(attempt)
+                return
+            if status == TIME_LIMIT_STATUS and self._launcher.limits_time:
+                self._finish(lease, stop, _at_time_limit(job))
                 return
             result = job_result(job.kind, status, process.output())
             if result is not None:
@@ -143,7 +154,7 @@ class Worker:
     def _wait(self, process: Process, lease: Lease, stop: threading.Event) -> int | None:
         """Wait for the end of an attempt and return its exit status; None if it has to be ended before."""
         job = lease.job
-        deadline = time.monotonic() + job.seconds
+        deadline = math.inf if self._launcher.limits_time else time.monotonic() + job.seconds
         while (status := process.wait(HEARTBEAT_SECONDS)) is None:
             if stop.is_set():
                 process.suspend(SUSPENSION_SECONDS)
@@ -152,8 +163,7 @@ class Worker:
                 return None
             if time.monotonic() > deadline:
                 process.end()
-                message = f"stopped at its time limit, {job.seconds:g} s"
-                self._finish(lease, stop, JobResult(JobStatus.FAILED, message))
+                self._finish(lease, stop, _at_time_limit(job))
                 return None
             if not self._is_still_ours(lease, process):
                 log.info("job %s: no longer this worker's", job.id)
@@ -207,15 +217,17 @@ class Worker:
         message = f"given up: {lease.crashes} attempts ended at the same point: {self._log(lease).end()}"
         self._finish(lease, stop, JobResult(JobStatus.FAILED, message))
 
-    def _arguments(self, lease: Lease) -> list[str]:
-        file = self._jobs.log_path(lease.job).with_suffix(".toml")
+    def _attempt(self, lease: Lease) -> JobAttempt:
+        job, log_path = lease.job, self._jobs.log_path(lease.job)
+        file = log_path.with_suffix(".toml")
         file.parent.mkdir(exist_ok=True)
         file.write_bytes(tomli_w.dumps(lease.document).encode())
-        return [
-            *(kind_named(lease.job.kind).command, str(file)),
+        arguments = [
+            *(kind_named(job.kind).command, str(file)),
             *("--store", str(self._store.path)),
             *("--progress", "json", "--json"),
         ]
+        return JobAttempt(job.id, job.ranks, self._memory // job.ranks, job.seconds, arguments, log_path)
 
     def _log(self, lease: Lease) -> JobLog:
         return JobLog(self._jobs.log_path(lease.job))
@@ -269,6 +281,10 @@ def job_result(kind: str, status: int, output: str) -> JobResult | None:
         return JobResult(ANSWERS[status], kind_named(kind).summary(json.loads(output)))
     except (ValueError, LookupError, TypeError):  # cut short, or not the document of such an answer
         return None
+
+
+def _at_time_limit(job: Job) -> JobResult:
+    return JobResult(JobStatus.FAILED, f"stopped at its time limit, {job.seconds:g} s")
 
 
 def _in_words(status: int) -> str:

@@ -174,6 +174,14 @@ def test_settings_come_from_the_environment_and_are_checked(store, monkeypatch):
         assert "at most 1" in answer.json()["detail"]
 
 
+def test_a_launcher_that_cannot_be_used_is_refused(store, monkeypatch):
+    monkeypatch.setenv("ENSEMBLE_LAUNCHER", "rsh")
+    assert "ENSEMBLE_LAUNCHER" in refused(store)
+    monkeypatch.setenv("ENSEMBLE_LAUNCHER", "slurm")
+    monkeypatch.setenv("PATH", "/nonexistent")
+    assert "sbatch" in refused(store)
+
+
 def test_a_directory_that_is_not_a_store_is_refused(tmp_path):
     directory = tmp_path / "precious"
     directory.mkdir()

@@ -22,7 +22,8 @@ from api.jobs.job_queue import Jobs
 from api.settings import Settings
 from api.worker.background import NICENESS
 from api.worker.delays import growing_delay
-from api.worker.mpirun import mpirun_command
+from api.worker.launchers.launcher import JobAttempt
+from api.worker.launchers.mpirun import Mpirun
 from api.worker.worker import ANSWERS, MAXIMUM_CRASHES, JobResult, Worker, job_result
 from ensemble.questions import INCOMPLETE_STATUS, Question, preset_question
 from ensemble.store import Store
@@ -256,19 +257,39 @@ def locked_catalog(store: Path) -> Iterator[None]:
         yield
 
 
+class Shell:
+    """A launcher that has every job carried out by a piece of shell script."""
+
+    limits_time = False
+
+    def __init__(self) -> None:
+        self.script = ""
+
+    def command(self, attempt: JobAttempt) -> list[str]:
+        return ["/bin/sh", "-c", self.script]
+
+    def end(self, attempt: JobAttempt) -> None:
+        pass
+
+
 @pytest.fixture
-def worker(jobs: Jobs, store: Path) -> Iterator[tuple[Worker, threading.Event]]:
+def shell() -> Shell:
+    return Shell()
+
+
+@pytest.fixture
+def worker(jobs: Jobs, store: Path, shell: Shell) -> Iterator[tuple[Worker, threading.Event]]:
     """A worker in this process, and what stops it."""
     with Store.open(store) as opened:
-        yield Worker(jobs, opened, 1 << 32), threading.Event()
+        yield Worker(jobs, opened, 1 << 32, shell), threading.Event()
 
 
 @pytest.fixture
-def command(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
+def command(shell: Shell) -> Callable[[str], None]:
     """Let jobs be carried out by a piece of shell script."""
 
     def use(script: str) -> None:
-        monkeypatch.setattr("api.worker.worker.mpirun_command", lambda *_: ["/bin/sh", "-c", script])
+        shell.script = script
 
     return use
 
@@ -389,9 +410,10 @@ def test_outages_however_many_cost_no_job(jobs, worker, command, store, monkeypa
     assert max(waited) > MAXIMUM_CRASHES  # the job itself may be what fills the disk
 
 
-def test_a_job_that_needs_more_memory_than_it_may_have_says_so(launcher):
+def test_a_job_that_needs_more_memory_than_it_may_have_says_so(launcher, tmp_path):
     large = ("--set=numerics.points=1024", "--set=vesicles.viscosity_contrast=4.0")
-    command = mpirun_command(1, 300_000_000, ["run", "doublet-shear", *large, "--no-store", "--json"])
+    arguments = ["run", "doublet-shear", *large, "--no-store", "--json"]
+    command = Mpirun().command(JobAttempt("a", 1, 300_000_000, SECONDS, arguments, tmp_path / "log"))
     ended = subprocess.run(command, env=launcher.environment, capture_output=True, text=True, check=False)
     assert ended.returncode not in ANSWERS
     assert "ensemble: there is not enough memory" in ended.stderr

@@ -1,9 +1,8 @@
-"""One `mpirun` with all of its descendants and its output."""
+"""The command of one attempt, with all of its descendants and its output."""
 
 from __future__ import annotations
 
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -18,47 +17,8 @@ from pydantic import ValidationError
 
 from api.worker.job_log import JobLog
 from ensemble.display.progress_line import ProgressLine
-from ensemble.errors import BadInput
 
 _END_SECONDS = 5.0
-
-
-def mpirun_command(ranks: int, memory: int, arguments: Sequence[str]) -> list[str]:
-    """Return the command that runs `ensemble` on several ranks, at low priority and with limited memory.
-
-    Parameters
-    ----------
-    ranks : int
-    memory : int
-        Bytes that each rank may use.
-    arguments : sequence of str
-        Of `ensemble`.
-
-    Returns
-    -------
-    list of str
-
-    Raises
-    ------
-    BadInput
-        If there is no `mpirun`.
-    """
-    beside = Path(sys.executable).with_name("mpirun")
-    mpirun = str(beside) if beside.exists() else shutil.which("mpirun")
-    if mpirun is None:
-        raise BadInput("mpirun: there is none on the PATH (the extra 'mpich' brings one)")
-    # -P: a folder with the name of a package, where the service was started, must not be imported instead.
-    return [
-        mpirun,
-        "-n",
-        str(ranks),
-        sys.executable,
-        "-P",
-        "-m",
-        "api.worker.background",
-        str(memory),
-        *arguments,
-    ]
 
 
 class Process(AbstractContextManager["Process"]):
