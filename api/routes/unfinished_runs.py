@@ -115,7 +115,7 @@ def get_unfinished_series(
     BadInput
         If there is no diagnostic of a name, or there are too many records for one answer.
     """
-    arrays = UnfinishedSeries(_found(reader.service, key).arrays().get("series", {}))
+    arrays = UnfinishedSeries(_found(reader.service, key).series())
     numbers = range(start, stop, stride)
     selection = SeriesSelection.of(arrays, name, numbers, reader.service.settings.frame_values)
     return stream(reader, request, selection.json(), JSON)

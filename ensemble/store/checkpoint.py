@@ -85,7 +85,7 @@ class Checkpoint:
         content = {
             "scene": self._scene.model_dump_json(),
             "simulation": saved,
-            "record": {"writer": writer, "counts": self.record.counts},
+            "record": {"writer": writer, "counts": self.record.counts, "rows": self.record.rows},
         }
         try:
             write_plain(unfinished, content, self._attributes() | {"writer": writer})
@@ -126,7 +126,7 @@ class Checkpoint:
             raise StoreError(f"it is damaged ({error})") from error
         if not isinstance(content, dict) or "record" not in content:
             raise StoreError("an earlier version wrote it")
-        self.record.take_over(**content["record"])
+        self.record.take_over(content["record"]["writer"], content["record"]["counts"])
         saved: Saved = content["simulation"]
         return saved
 

@@ -14,7 +14,7 @@ import shutil
 from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from functools import lru_cache
+from functools import lru_cache, partial
 from itertools import accumulate
 from pathlib import Path
 
@@ -44,12 +44,15 @@ class RecordedBlocks(Sink):
     ----------
     counts : dict of str to int
         How many blocks there are of each part of the record.
+    rows : dict of str to int
+        How many rows they have together.
     """
 
-    memory = ("counts",)
+    memory = ("counts", "rows")
 
     def __init__(self, place: Path, own_directory: Callable[[], Path]) -> None:
         self.counts: dict[str, int] = {}
+        self.rows: dict[str, int] = {}
         self._place = place
         self._own_directory = own_directory
         self._waiting: dict[tuple[str, int], Block] = {}
@@ -68,6 +71,7 @@ class RecordedBlocks(Sink):
         number = self.counts.get(part, 0)
         self._waiting[part, number] = block
         self.counts[part] = number + 1
+        self.rows[part] = self.rows.get(part, 0) + _length(block)
 
     def write(self) -> None:
         """Write all blocks that are not on disk.
@@ -142,7 +146,7 @@ class RecordedBlocks(Sink):
             block = self._block(part, number)
             return with_points(block, points) if part == FRAMES and points else block
 
-        return recorded_arrays(self.counts, read)
+        return {part: recorded_arrays(count, partial(read, part)) for part, count in self.counts.items()}
 
     def remove(self) -> None:
         """Remove the files of this process."""
@@ -212,31 +216,24 @@ class RecordedArray:
         return np.concatenate(found) if found else np.empty((0, *self.shape[1:]))
 
 
-def recorded_arrays(
-    counts: Mapping[str, int], read: Callable[[str, int], Block]
-) -> dict[str, dict[str, RecordedArray]]:
-    """Return the arrays of a record.
+def recorded_arrays(count: int, read: Callable[[int], Block]) -> dict[str, RecordedArray]:
+    """Return the arrays of a part of a record.
 
     Parameters
     ----------
-    counts : mapping of str to int
-        How many blocks there are of each part.
+    count : int
+        How many blocks there are, at least one.
     read : callable
-        From a part and a number to the block.
+        From the number of a block to the block.
 
     Returns
     -------
-    dict of str to dict of str to RecordedArray
-        By the part of the record, and by name.
+    dict of str to RecordedArray
+        By name.
     """
     read = lru_cache(_CACHED)(read)
-
-    def of_part(part: str, count: int) -> dict[str, RecordedArray]:
-        rows = [len(next(iter(read(part, number).values()))) for number in range(count)]
-        ends = list(accumulate(rows))
-        return {name: RecordedArray(name, ends, lambda number: read(part, number)) for name in read(part, 0)}
-
-    return {part: of_part(part, count) for part, count in counts.items() if count}
+    ends = list(accumulate(_length(read(number)) for number in range(count)))
+    return {name: RecordedArray(name, ends, read) for name in read(0)}
 
 
 def read_block(directory: Path, part: str, number: int) -> Block:
@@ -265,6 +262,10 @@ def read_block(directory: Path, part: str, number: int) -> Block:
     except UnreadableFileError as error:
         raise StoreError(f"run {directory.parent.name}: what it has recorded is damaged ({error})") from error
     return block
+
+
+def _length(block: Block) -> int:
+    return len(next(iter(block.values())))
 
 
 def _name(part: str, number: int) -> str:

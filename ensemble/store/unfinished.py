@@ -40,6 +40,8 @@ class UnfinishedRun:
         Of what that process has recorded of the run.
     counts : dict of str to int
         How many blocks the checkpoint counts of each part of the record.
+    rows : dict of str to int
+        How many rows they have together.
     """
 
     key: str
@@ -49,6 +51,7 @@ class UnfinishedRun:
     saved: Saved
     place: Path
     counts: dict[str, int]
+    rows: dict[str, int]
 
     @classmethod
     def read(cls, store: Path, key: str) -> Self:
@@ -84,6 +87,7 @@ class UnfinishedRun:
                 saved=content["simulation"],
                 place=store / CHECKPOINTS / key / record["writer"],
                 counts=record["counts"],
+                rows=record["rows"],
             )
         except (OSError, UnreadableFileError, LookupError, TypeError, ValidationError) as error:
             raise StoreError(f"run {key}: its checkpoint cannot be read ({error})") from error
@@ -126,29 +130,30 @@ class UnfinishedRun:
                 memory.take(part, read_block(self.place, part, number))
         return run_so_far(self.scene, self.saved, memory)
 
-    def arrays(self) -> dict[str, dict[str, RecordedArray]]:
-        """Return what has been recorded, to read some of its rows.
+    def series(self) -> dict[str, RecordedArray]:
+        """Return the diagnostics that have been recorded, to read some of their rows.
 
         Returns
         -------
-        dict of str to dict of str to RecordedArray
-            By the part of the record, and by name.
+        dict of str to RecordedArray
+            By name; empty while the start relaxes.
 
         Raises
         ------
         StoreError
-            If it cannot be read; see `run`.
+            If they cannot be read; see `run`.
         """
         from ensemble.store.recorded_blocks import read_block, recorded_arrays
+        from solver.analysis.record import SERIES
         from solver.simulation.run_so_far import open_blocks
 
-        last = open_blocks(self.saved)
+        last, written = open_blocks(self.saved).get(SERIES), self.counts.get(SERIES, 0)
+        count = written + (last is not None)
 
-        def read(part: str, number: int) -> Block:
-            return last[part] if number == self.counts.get(part, 0) else read_block(self.place, part, number)
+        def read(number: int) -> Block:
+            return last if last is not None and number == written else read_block(self.place, SERIES, number)
 
-        parts = self.counts.keys() | last.keys()
-        return recorded_arrays({part: self.counts.get(part, 0) + (part in last) for part in parts}, read)
+        return recorded_arrays(count, read) if count else {}
 
     def json_document(self) -> dict[str, Any]:
         """Return how far the run has come, its last diagnostics, and its scene.
@@ -158,9 +163,14 @@ class UnfinishedRun:
         dict
             JSON data.
         """
-        from solver.simulation.run_so_far import sample_so_far
+        from solver.analysis.record import FRAMES, SERIES
+        from solver.simulation.run_so_far import open_blocks, sample_so_far
 
-        arrays = self.arrays()
+        last = open_blocks(self.saved)
+
+        def rows(part: str) -> int:
+            return self.rows.get(part, 0) + (len(last[part]["time"]) if part in last else 0)
+
         return {
             "run_key": self.key,
             "status": "in progress" if self.in_progress else "interrupted",
@@ -168,8 +178,8 @@ class UnfinishedRun:
             "time": self.time,
             "horizon": self.scene.horizon,
             "wall_seconds": self.saved["wall_seconds"],
-            "samples": arrays["series"]["time"].shape[0] if arrays else 0,
-            "frames": arrays["frames"]["time"].shape[0] if arrays else 0,
+            "samples": rows(SERIES),
+            "frames": rows(FRAMES),
             "last": sample_so_far(self.saved),
             "scene": self.scene.model_dump(mode="json", exclude_none=True),
         }

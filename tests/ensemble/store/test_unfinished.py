@@ -63,7 +63,7 @@ def test_what_is_seen_is_the_beginning_of_the_run(staging: RunStaging, name: str
             np.testing.assert_array_equal(values, expected[each][:samples], err_msg=each)
     np.testing.assert_array_equal(run.frames.center, whole.frames.center[:frames])
     document = json.loads(json.dumps(seen.json_document()))
-    assert document["samples"] == samples
+    assert (document["samples"], document["frames"]) == (samples, frames)
     assert document["last"]["time"] == run.series["time"][-1]
 
 
