@@ -24,7 +24,7 @@ DOUBLET_STUDIES = (
     "critical-hamaker",
     "critical-separation-rate",
 )
-STUDIES = (*DOUBLET_STUDIES, "critical-viscosity-contrast")
+STUDIES = (*DOUBLET_STUDIES, "critical-hamaker-flow-type", "critical-viscosity-contrast")
 PUBLISHED = (
     "doublet-draining",
     "doublet-equilibrium",
