@@ -42,6 +42,7 @@ import { color } from "./theme.js";
  * @property {string[]} text - What is said of it: outcome, place, results and errors.
  */
 
+const LONGEST_NAME = 44; // characters in the legend, which fit on a narrow screen
 const LAST_IN_LEGEND = 2000; // the default of Plotly is 1000
 
 /**
@@ -201,7 +202,8 @@ function comparedBoundary(boundary) {
     "compared",
     BARS.usual,
   );
-  const name = boundary.name.replaceAll("&", "&amp;").replaceAll("<", "&lt;");
+  const short = boundary.name.length > LONGEST_NAME ? `${boundary.name.slice(0, LONGEST_NAME)}…` : boundary.name;
+  const name = short.replaceAll("&", "&amp;").replaceAll("<", "&lt;");
   const legendrank = LAST_IN_LEGEND + 1;
   return [{ ...bars, name, legendrank, showlegend: true, line: { color: color("compared"), width: 1.8, dash: "2px,3px" } }];
 }

@@ -23,7 +23,7 @@ class Numerics(Model):
     tolerance : float
         Estimated local error allowed in a step, absolute, of tangent angles (radians) and centers.
     integrator : str
-        Method of integration in time, one of `INTEGRATORS`; "auto" for the fastest one.
+        Method of integration in time; "auto" for the fastest one.
     order : int or None
         Of "sdc"; None for its usual one.
     step_control : str
