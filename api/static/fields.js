@@ -41,6 +41,7 @@ const VARIED = /(?:^|\.)parameter$/;
 const LABELS = /** @type {Record<string, string>} */ ({
   flow: "imposed flow",
   adhesion: "adhesion potential",
+  protocol: "change of the rate with time",
   horizon: "latest end",
   "numerics.points": "points on each vesicle",
   "numerics.tolerance": "tolerance in time",

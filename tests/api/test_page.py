@@ -513,6 +513,22 @@ def test_flow_potential_and_integrator_are_chosen_from_menus(page: Page, url: st
     expect(page.get_by_role("button", name="Submit")).to_be_enabled()
 
 
+def test_a_protocol_of_the_rate_is_chosen_from_a_menu(page: Page, url: str) -> None:
+    """A scene without one does not have the field at all."""
+    page.goto(f"{url}/#/new?preset=vesicle-shear")
+    protocol = page.get_by_label("change of the rate with time")
+    expect(protocol).to_have_value("none")
+    protocol.select_option("ramp")
+    page.get_by_label("duration in μR³κ⁻¹").fill("20")
+    with page.expect_request("**/jobs") as sent:
+        page.get_by_role("button", name="Submit").click()
+    changed = sent.value.post_data_json["set"]["protocol"]
+    assert (changed["kind"], changed["duration"]) == ("ramp", 20)
+    page.wait_for_url("**/#/jobs/*")
+    page.get_by_role("button", name="Cancel").click()
+    expect(page.locator(".job-status")).to_contain_text("dismissed")
+
+
 def test_addresses_without_a_view_lead_back(page: Page, url: str) -> None:
     for address, way in (("nowhere", "boundaries"), ("runs/" + 32 * "0", "runs"), ("jobs/none", "jobs")):
         page.goto(f"{url}/#/{address}")
