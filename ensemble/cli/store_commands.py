@@ -71,10 +71,10 @@ def query(  # numpydoc ignore=PR01
     from ensemble.questions.scene_question import SceneQuestion
     from ensemble.store.listing import Listing, without_reports
 
-    if collection == SceneQuestion.collection and not reports:
-        where = [*without_reports(where)]
+    is_chosen = collection == SceneQuestion.collection and not reports
+    filters = without_reports(where) if is_chosen else tuple(where)
     # One more, to know whether there are more.
-    listing = Listing(tuple(where), sort, limit + 1 if limit else None)
+    listing = Listing(filters, sort, limit + 1 if limit else None)
     paths = [path.strip() for column in columns for path in column.split(",")]
     with refusing(), _existing(store) as opened:
         answers = _all_stored(opened, collection, listing, paths)
@@ -85,6 +85,12 @@ def query(  # numpydoc ignore=PR01
             print_list(answers.columns, documents)
         if next(answers.json_documents, None) is not None:
             print(f"ensemble: there are more than {limit}; --limit 0 lists all", file=sys.stderr)
+        left_out = Listing((*where, "report!=null"), limit=1)
+        if filters != tuple(where) and next(opened.run_records(left_out), None) is not None:
+            print(
+                "ensemble: runs made for reports are left out; --reports lists them",
+                file=sys.stderr,
+            )
 
 
 def _all_stored(store: Store, collection: str, listing: Listing, columns: list[str]) -> StoredAnswers:

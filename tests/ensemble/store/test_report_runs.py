@@ -21,6 +21,7 @@ def test_lists_leave_the_runs_of_reports_out_unless_asked(tmp_path, ensemble):
     def listed(*options: str) -> set[str]:
         answer = ensemble("query", "runs", "--columns=key", f"--store={path}", *options)
         assert answer.returncode == 0, answer.stderr
+        assert ("--reports lists them" in answer.stderr) == (not options)
         return set(answer.stdout.splitlines()[1:])
 
     assert listed() == {own}
