@@ -147,8 +147,8 @@ function runs(marks) {
   });
 }
 
-/** Brackets that are certified have thick bars. */
-const BARS = { certified: { thickness: 3.2, width: 9 }, usual: { thickness: 1.2, width: 8 } };
+/** Brackets that are certified have thick and wide bars. */
+const BARS = { certified: { thickness: 2.6, width: 11 }, usual: { thickness: 1.2, width: 7 } };
 
 /**
  * @param {Boundary} boundary

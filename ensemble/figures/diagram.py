@@ -97,7 +97,7 @@ def _draw_other_changes(axes: Axes, points: Sequence[BoundaryPoint], swept: str)
 
 
 def _bars(
-    axes: Axes, sweep: Array, low: Array, high: Array, color: str, label: str, thickness: float = 1.0
+    axes: Axes, sweep: Array, low: Array, high: Array, color: str, label: str, bold: bool = False
 ) -> LineCollection:
     _, _, (bars,) = axes.errorbar(
         sweep,
@@ -105,9 +105,9 @@ def _bars(
         yerr=(high - low) / 2,
         fmt="none",
         ecolor=color,
-        elinewidth=thickness,
-        capsize=5.5,
-        capthick=thickness,
+        elinewidth=2.6 if bold else 1.0,
+        capsize=8.0 if bold else 5.0,
+        capthick=1.3 if bold else 1.0,
         zorder=3,
         label=label,
     )
@@ -115,12 +115,12 @@ def _bars(
 
 
 def _draw_brackets(axes: Axes, bracketed: Sequence[BoundaryPoint], swept: str) -> None:
-    for label, thickness, is_certified in (("bracket", 1.0, False), ("certified bracket", 2.6, True)):
+    for label, is_certified in (("bracket", False), ("certified bracket", True)):
         points = [point for point in bracketed if point.certified == is_certified]
         if points:
             low, high = np.array([point.bracket for point in points], dtype=float).T
             sweep = np.array([point.parameters[swept] for point in points])
-            _bars(axes, sweep, low, high, BLACK, label, thickness).set_gid(label)
+            _bars(axes, sweep, low, high, BLACK, label, is_certified).set_gid(label)
 
 
 def _draw_boundary(axes: Axes, bracketed: Sequence[BoundaryPoint], swept: str, y: Quantity) -> None:
