@@ -9,6 +9,9 @@ The bits of a result must not depend on what was compiled or loaded before.  The
 inlined where compiled code calls them (``forceinline=True``): of several copies of a function, optimized in
 several places, a process would take the one that it met first, and they round differently.  And one process
 compiles a function while the others wait for it, so that all have the same machine code.
+
+Numba asks only whether the source file of a function has changed.  What the function contains of others, and
+how it is compiled, is part of the key here, so that an edit anywhere is an edit.
 """
 
 from __future__ import annotations
@@ -19,13 +22,16 @@ import logging
 import os
 import pickle
 import time
-from collections.abc import Callable
-from functools import cache, wraps
+from collections.abc import Callable, Iterator
+from functools import cache, cached_property, wraps
+from pathlib import Path
+from types import CodeType, FunctionType
 from typing import Any
 
 from numba import njit, types
 from numba.core import event
 from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.dispatcher import Dispatcher
 from numba.core.runtime import rtsys
 from numba.extending import intrinsic
 
@@ -109,6 +115,16 @@ class _ToleratedCache(FunctionCache):
             source_stamp=self._impl.locator.get_source_stamp(),
         )
 
+    def _index_key(self, sig: Any, codegen: Any) -> Any:
+        return *super()._index_key(sig, codegen), self._digest_of_contents
+
+    @cached_property
+    def _digest_of_contents(self) -> str:
+        digest = hashlib.sha256(Path(__file__).read_bytes())
+        for part in _contents(self._py_func, set()):
+            digest.update(part)
+        return digest.hexdigest()
+
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         found = self._look(sig, target_context)
         if found is None and self._locked():
@@ -151,6 +167,31 @@ class _ToleratedCache(FunctionCache):
             super().save_overload(sig, data)
         except OSError as error:
             _say_once(error.strerror or str(error))
+
+
+def _contents(function: Callable[..., Any], seen: set[Callable[..., Any]]) -> Iterator[bytes]:
+    """Yield what decides the machine code of a function: code and constants, its own and of what it calls."""
+    if function in seen:
+        return
+    seen.add(function)
+    for code in _codes(function.__code__):
+        yield code.co_code
+        yield repr([each for each in code.co_consts if not isinstance(each, CodeType)]).encode()
+        for name in code.co_names:
+            value = function.__globals__.get(name)
+            if isinstance(value, Dispatcher):
+                yield from _contents(value.py_func, seen)
+            elif isinstance(value, FunctionType):  # something else in that file stands for it when compiled
+                yield Path(value.__code__.co_filename).read_bytes()
+            elif isinstance(value, int | float | str | tuple):
+                yield f"{name}={value!r}".encode()
+
+
+def _codes(code: CodeType) -> Iterator[CodeType]:
+    yield code
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _codes(constant)
 
 
 def _taken(lock: int) -> bool:

@@ -170,6 +170,29 @@ def test_one_of_several_processes_compiles_and_the_others_load(tmp_path: Path) -
     assert hits == ["0", "1", "1"]
 
 
+def test_an_edit_of_what_a_function_calls_is_noticed(tmp_path: Path) -> None:
+    """Numba itself looks at the file of the outermost function only."""
+    definitions = (
+        "from solver.compilation import compiled\n{constant}\n@compiled\ndef inner(x):\n    return {inner}\n"
+    )
+    (tmp_path / "outer.py").write_text(
+        "from definitions import CONSTANT, inner\nfrom solver.compilation import compiled\n"
+        "@compiled\ndef outer(x):\n    return CONSTANT * inner(x)\n"
+        "print(outer(1.0), outer.stats.cache_hits.total())\n"
+    )
+    printed = []
+    for constant, inner in (
+        ("CONSTANT = 1.0", "x"),
+        ("CONSTANT = 1.0", "x + 1.0"),
+        ("CONSTANT = 3.0", "x + 1.0"),
+    ):
+        (tmp_path / "definitions.py").write_text(definitions.format(constant=constant, inner=inner))
+        printed += [
+            run(tmp_path / "outer.py", f"import sys; sys.path.insert(0, {str(tmp_path)!r})") for _ in range(2)
+        ]
+    assert [output for output, _ in printed] == ["1.0 0", "1.0 1", "2.0 0", "2.0 1", "6.0 0", "6.0 1"]
+
+
 def test_bits_do_not_depend_on_what_was_compiled_or_loaded_before(tmp_path: Path) -> None:
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path), "NUMBA_CACHE_DIR": str(tmp_path)}
     digests = [
