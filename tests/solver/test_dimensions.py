@@ -176,7 +176,7 @@ def test_different_units_are_not_kept_for_ever() -> None:
 def test_every_length_time_and_rate_of_a_scene_states_its_dimension() -> None:
     """By their names, so that none loses it."""
     stated = {"horizon", "rate", "distance", "cutoff", "hamaker", "adhesion_energy", "length", "center"}
-    stated |= {"bending_modulus", "angle", "tilt", "interval", "frame_interval"}
+    stated |= {"bending_modulus", "angle", "tangent_angle", "tilt", "interval", "frame_interval"}
     stated |= {"separated_distance", "steady_rate", "steady_time"}
     document = {"adhesion": {"hamaker": 1, "distance": 1}, "flow": {"kind": "trap", "rate": 1}}
     scene = Scene.model_validate({"horizon": 1.0, "vesicles": [{}]} | document)
