@@ -5,9 +5,6 @@ from __future__ import annotations
 import json
 import shlex
 import sys
-import time
-from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 
 import pytest
@@ -15,10 +12,9 @@ import pytest
 from ensemble.store import Store
 from ensemble.store.checkpoint import checkpointed_keys
 from tests import slurm
-from tests.benchmarks.restarts import CUTS, bits_of_only_run, newest_checkpoint
+from tests.benchmarks.restarts import CUTS, bits_of_only_run
+from tests.benchmarks.slurm_requeues import SCRIPT, run_in_jobs, wait_while_going_on
 from tests.conftest import ENSEMBLE, QUICK_STUDY, Finished, Launcher
-
-SCRIPT = Path(__file__).parents[2] / "deploy" / "bisect.slurm"
 
 pytestmark = pytest.mark.long  # each starts ranks that trace the quick study: 10 to 20 s of processor time
 
@@ -44,17 +40,6 @@ def runs(store: Path) -> int:
         return opened.count_runs()
 
 
-def is_newer_than(earlier: float, store: Path) -> bool:
-    return newest_checkpoint(store) > earlier
-
-
-def wait_while_going_on(cluster: slurm.Cluster, job: str, log: Path, condition: Callable[[], object]) -> None:
-    """Wait until something is true; fail with the log if the job ends before."""
-    while not condition():
-        assert job in cluster.jobs(), log.read_text(encoding="utf-8")
-        time.sleep(0.1)
-
-
 def test_a_study_that_is_told_to_end_queues_itself_again_and_goes_on(
     slurm_cluster: slurm.Cluster, finished_study: Finished, tmp_path: Path
 ) -> None:
@@ -78,25 +63,12 @@ def test_a_study_that_is_told_to_end_queues_itself_again_and_goes_on(
 def test_a_run_in_several_jobs_ends_with_the_same_bits(
     slurm_cluster: slurm.Cluster, launcher: Launcher, tmp_path: Path
 ) -> None:
-    cut, log = CUTS["24 vesicles, two ranks"], tmp_path / "log"
+    cut = CUTS["24 vesicles, two ranks"]
     arguments = [*cut.arguments[1:], "--set=horizon=4.0"]
     undisturbed = launcher.run(2, [*ENSEMBLE, "run", *arguments, f"--store={tmp_path / 'undisturbed'}"])
     assert undisturbed.returncode == 0, undisturbed.stderr
-    job = slurm_cluster.submit(
-        *("--ntasks=2", "--time=10", f"--output={log}", SCRIPT, *arguments),
-        ENSEMBLE_COMMAND="run",
-        ENSEMBLE_ENVIRONMENT=sys.prefix,
-        ENSEMBLE_STORE=str(tmp_path / "store"),
-        ENSEMBLE_CHECKPOINT_SECONDS="0.2",
-    )
-    for times in (1, 2):
-        earlier = newest_checkpoint(tmp_path / "store")
-        wait_while_going_on(slurm_cluster, job, log, partial(is_newer_than, earlier, tmp_path / "store"))
-        slurm_cluster.run("scancel", "--signal=TERM", job)
-        slurm_cluster.wait_until_requeued(job, times)
-    assert slurm_cluster.wait(job)["JobState"] == "COMPLETED", log.read_text(encoding="utf-8")
-    assert log.read_text(encoding="utf-8").count("goes on from its checkpoint") == 2
-    assert bits_of_only_run(tmp_path / "store") == bits_of_only_run(tmp_path / "undisturbed")
+    store = run_in_jobs(slurm_cluster, arguments, 3, tmp_path)
+    assert bits_of_only_run(store) == bits_of_only_run(tmp_path / "undisturbed")
 
 
 def test_a_canceled_job_does_not_queue_itself_again(slurm_cluster: slurm.Cluster, tmp_path: Path) -> None:
