@@ -94,7 +94,8 @@ class SlurmJob:
         self._passed = 0
         self._state = "PENDING"
         self._waits = False
-        self._suspended = False
+        self._asked_to_end = False
+        self._told_to_end = False
 
     def submit(self, ranks: int, seconds: float, options: Sequence[str], command: Sequence[str]) -> None:
         """Submit it, once no earlier one of its name is left.
@@ -155,9 +156,11 @@ class SlurmJob:
             self._pass_on_errors()
             if self._state in _RUNNING:
                 deadline = min(deadline, time.monotonic() + seconds)
+                self._tell_to_end_if_asked()
             elif self._state not in _WAITING:
+                self._pass_on_errors(to_the_end=True)
                 return self._status(details)
-            elif self._suspended:
+            elif self._asked_to_end:
                 self._cancel()
                 return SUSPENDED_STATUS
             if time.monotonic() > deadline:
@@ -170,8 +173,7 @@ class SlurmJob:
 
     def suspend(self) -> None:
         """Let the ranks keep their runs and end; if they wait for their start the job is canceled."""
-        self._suspended = True
-        _slurm("scancel", "--signal=TERM", self._number)
+        self._asked_to_end = True
 
     def end(self) -> None:
         """Cancel it, and all others of its name, and remove its files."""
@@ -209,23 +211,30 @@ class SlurmJob:
         self._waits = state == "PENDING"
         self._state = state
 
+    def _tell_to_end_if_asked(self) -> None:
+        # Once: a second signal ends the ranks before they have kept anything.
+        if self._asked_to_end and not self._told_to_end:
+            self._told_to_end = True
+            _slurm("scancel", "--signal=TERM", self._number)
+
     def _status(self, details: dict[str, str]) -> int:
-        status, _, number = details.get("ExitCode", "1:0").partition(":")
+        exited, _, number = details.get("ExitCode", "1:0").partition(":")
+        status = 128 + int(number) if int(number) else int(exited)
+        if self._told_to_end and status == 128 + signal.SIGTERM:  # before there was anything to keep
+            return SUSPENDED_STATUS
         if self._state == "TIMEOUT":
             return TIME_LIMIT_STATUS
-        if int(number):
-            return 128 + int(number)
         if self._state not in ("COMPLETED", "FAILED"):  # canceled, preempted, its node failed
             print(f"job {self._number} of Slurm: {self._state}", file=sys.stderr)
             return 1
-        return int(status)
+        return status
 
-    def _pass_on_errors(self) -> None:
-        """Write the whole lines that have been added to the file of standard error."""
+    def _pass_on_errors(self, to_the_end: bool = False) -> None:
+        """Write what has been added to the file of standard error: whole lines, or all of it."""
         with suppress(FileNotFoundError), self._errors.open("rb") as file:
             file.seek(self._passed)
             new = file.read()
-            whole = new[: new.rfind(b"\n") + 1]
+            whole = new if to_the_end else new[: new.rfind(b"\n") + 1]
             self._passed += len(whole)
             sys.stderr.write(whole.decode(errors="replace"))
             sys.stderr.flush()
