@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from solver.membrane import curve
 from solver.membrane.resampling import resampled_angle
 from solver.membrane.shapes import closed_of_reduced_area
-from solver.scene.tangent_angles import reduced_area_of
+from solver.scene.tangent_angles import crosses_itself, reduced_area_of
 
 Array = NDArray[np.float64]
 
 FEWEST_POINTS = 8
 _FEWEST_ANGLES, _MOST_ANGLES = 32, 512
 _FINE = 8192  # arclengths at which the spline is sampled
-_DRAWN = 1024  # points of the curve among which the nearest ones are looked for
+_DRAWN = 1024  # points of the curve among which the nearest ones, and crossings, are looked for
 
 
 @dataclass(frozen=True)
@@ -81,6 +81,8 @@ def traced_curve(points: Array) -> TracedCurve:
         raise ValueError("the points are not in order along a simple closed curve")
     reduced_area = min(enclosed, 1.0)
     shape = closed_of_reduced_area(shape, reduced_area)
+    if crosses_itself(resampled_angle(shape, _DRAWN)):
+        raise ValueError("the curve through the points crosses itself")
     center = spline(equispaced).mean(axis=0)
     return TracedCurve(shape, length, reduced_area, center, _largest_distance(points, shape, center, length))
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.scene.ellipses import semi_axes
-from solver.scene.tangent_angles import modes_of
+from solver.scene.tangent_angles import points_of
 
 if TYPE_CHECKING:
     from solver.scene.vesicle import Vesicle
@@ -34,9 +34,8 @@ def outline(vesicle: Vesicle) -> ComplexArray:
         angle = 2 * np.pi * np.arange(_POINTS) / _POINTS
         offsets = major * np.cos(angle) + 1j * minor * np.sin(angle)
     else:
-        modes, k = modes_of(np.array(vesicle.tangent_angle))
-        integrated = np.where(k == 0, 0.0, modes / np.where(k == 0, 1, 1j * k))
-        offsets = np.fft.ifft(integrated) * k.size * vesicle.length / (2 * np.pi)
+        shape = np.array(vesicle.tangent_angle)
+        offsets = points_of(shape, shape.size) * vesicle.length / (2 * np.pi)
     return np.asarray(complex(*vesicle.center) + np.exp(1j * vesicle.angle) * offsets)
 
 

@@ -1,4 +1,4 @@
-"""What a list of tangent angles encloses.
+"""The curve that a list of tangent angles describes: what it encloses, and whether it crosses itself.
 
 With θ at N points equispaced in arclength, of a curve of the length 2π, and exp(iθ) = Σ c_k exp(ikα), the
 points are Σ c_k/(ik) exp(ikα).  So the curve is closed if c_0 = 0, and 4π·area/length² = Σ |c_k|²/k.
@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
+
+_FEWEST_SEGMENTS = 256  # of the polygon that is searched for crossings
 
 
 def reduced_area_of(tangent_angle: Array) -> tuple[float, float]:
@@ -31,6 +33,63 @@ def reduced_area_of(tangent_angle: Array) -> tuple[float, float]:
     modes, k = modes_of(tangent_angle)
     enclosed = np.sum(np.abs(modes[k != 0]) ** 2 / k[k != 0])
     return float(enclosed), float(np.abs(modes[0]))
+
+
+def points_of(tangent_angle: Array, count: int) -> ComplexArray:
+    """Return points x + iy of a curve of the length 2π about the origin.
+
+    Parameters
+    ----------
+    tangent_angle : (N,)
+        Radians, at points equispaced in arclength.
+    count : int
+        At least N.
+
+    Returns
+    -------
+    (count,)
+        Equispaced in arclength.
+    """
+    modes, k = modes_of(tangent_angle)
+    padded = np.zeros(count, dtype=np.complex128)
+    padded[k.astype(np.int64)] = np.where(k == 0, 0.0, modes / np.where(k == 0, 1, 1j * k))
+    return np.asarray(np.fft.ifft(padded) * count)
+
+
+def crosses_itself(tangent_angle: Array) -> bool:
+    """Return whether a closed curve crosses itself.
+
+    Parameters
+    ----------
+    tangent_angle : (N,)
+        Radians, at points equispaced in arclength.
+
+    Returns
+    -------
+    bool
+    """
+    starts = points_of(tangent_angle, max(tangent_angle.size, _FEWEST_SEGMENTS))
+    segments = np.roll(starts, -1) - starts
+    middles, longest = starts + segments / 2, np.abs(segments).max()
+    # Each segment with the one so many places ahead.  Those that cross have their middles within a length.
+    for ahead in range(2, starts.size // 2 + 1):
+        (near,) = np.nonzero(np.abs(np.roll(middles, -ahead) - middles) <= longest)
+        other = (near + ahead) % starts.size
+        if near.size and np.any(
+            _on_both_sides(starts[near], segments[near], starts[other], segments[other])
+            & _on_both_sides(starts[other], segments[other], starts[near], segments[near])
+        ):
+            return True
+    return False
+
+
+def _on_both_sides(
+    start: ComplexArray, segment: ComplexArray, other: ComplexArray, its_segment: ComplexArray
+) -> NDArray[np.bool_]:
+    """Return whether the ends of other segments lie on different sides of the lines through segments."""
+    first = (segment.conj() * (other - start)).imag > 0
+    second = (segment.conj() * (other + its_segment - start)).imag > 0
+    return np.asarray(first != second)
 
 
 def modes_of(tangent_angle: Array) -> tuple[ComplexArray, Array]:

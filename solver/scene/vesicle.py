@@ -10,7 +10,7 @@ from pydantic import Field, ValidationInfo, field_validator
 
 from solver.dimensions import ANGLE, BENDING_MODULUS, LENGTH
 from solver.model import Model, Positive
-from solver.scene.tangent_angles import reduced_area_of
+from solver.scene.tangent_angles import crosses_itself, reduced_area_of
 
 # A vesicle whose reduced area is less than this below 1 is circular: its curvature varies by 3e-5 at most.
 _ROUNDNESS = 1e-9
@@ -61,12 +61,15 @@ class Vesicle(Model):
             return None
         if len(shape) % 2:
             raise ValueError(f"must have an even number of angles, got {len(shape)}")
-        enclosed, gap = reduced_area_of(np.array(shape))
+        angles = np.array(shape)
+        enclosed, gap = reduced_area_of(angles)
         if not gap < _MISMATCH or not 0 < enclosed < 1 + _MISMATCH:
             raise ValueError("must be those of a closed curve that is run through counterclockwise")
         wanted = info.data.get("reduced_area")
         if wanted is not None and not abs(enclosed - wanted) < _MISMATCH:
             raise ValueError(f"have the reduced area {enclosed:.6g}, and reduced_area is {wanted:g}")
+        if crosses_itself(angles):
+            raise ValueError("must be those of a curve that does not cross itself")
         return shape
 
     @property

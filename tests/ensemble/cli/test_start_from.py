@@ -117,6 +117,10 @@ def test_points_in_a_unit(tmp_path: Path) -> None:
     [
         (("none.csv", "--scene=vesicle-shear"), "'none.csv' is no file"),
         (("words.csv", "--scene=vesicle-shear"), "words.csv: every line must have two numbers"),
+        (
+            ("crossing.csv", "--scene=vesicle-shear"),
+            "crossing.csv: the curve through the points crosses itself",
+        ),
         (("bean.csv",), "--scene"),
         (("bean.csv", "--scene=doublet-shear"), "2 vesicles, and there are 1 files"),
         (("bean.csv", "--scene=vesicle-shear", "--turn=3 m"), "unit of angle"),
@@ -127,6 +131,8 @@ def test_points_in_a_unit(tmp_path: Path) -> None:
 )
 def test_bad_input_is_refused_in_a_line(arguments: tuple[str, ...], message: str, tmp_path: Path) -> None:
     np.savetxt(tmp_path / "bean.csv", BEAN, delimiter=",")
+    crossing = np.column_stack([2 * np.cos(ANGLE), np.sin(ANGLE) * (1.3 * np.cos(ANGLE) ** 2 - 0.1)])
+    np.savetxt(tmp_path / "crossing.csv", crossing, delimiter=",")
     (tmp_path / "words.csv").write_text("x,y\n1,2,3\n")
     done = start_from(tmp_path, *arguments)
     assert done.returncode == 2

@@ -20,6 +20,12 @@ def ellipse(count: int, uneven: float = 0.4) -> Array:
     return np.column_stack([3 + 2 * np.cos(angle), -1 + np.sin(angle)])
 
 
+def dumbbell(neck: float) -> Array:
+    """Points of a dumbbell whose walls are 2·neck apart in its middle; below 0 they have changed sides."""
+    angle = 2 * np.pi * np.arange(64) / 64
+    return np.column_stack([2 * np.cos(angle), np.sin(angle) * (1.3 * np.cos(angle) ** 2 + neck)])
+
+
 LENGTH = 8 * ellipe(0.75)
 
 
@@ -49,6 +55,12 @@ def test_the_distance_says_what_is_smoothed_away() -> None:
     points = ellipse(64, uneven=0.0)
     points[::2] += 0.01 * (points[::2] - [3, -1])
     assert 0.002 < traced_curve(points).distance < 0.05
+
+
+def test_walls_may_be_near_but_may_not_cross() -> None:
+    assert traced_curve(dumbbell(0.02)).reduced_area > 0.2
+    with pytest.raises(ValueError, match="the curve through the points crosses itself"):
+        traced_curve(dumbbell(-0.02))
 
 
 @pytest.mark.parametrize(

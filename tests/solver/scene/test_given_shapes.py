@@ -56,6 +56,21 @@ def test_bad_shapes_are_refused_by_name(shape: np.ndarray, message: str) -> None
         Vesicle(tangent_angle=tuple(shape.tolist()))
 
 
+@pytest.mark.parametrize("count", [32, 64, 512])
+def test_a_shape_may_not_cross_itself(count: int) -> None:
+    """Walls of this family meet at a = 1.1711, where ∫ cos(t + a sin 2t) dt from −π/2 to π/2 is 0."""
+    along = 2 * np.pi * np.arange(count) / count
+    for size, crosses in ((1.16, False), (1.18, True), (1.5, True)):
+        shape = along + np.pi / 2 + size * np.sin(2 * along)
+        area, _ = reduced_area_of(shape)
+        fields = {"reduced_area": area, "tangent_angle": tuple(shape.tolist())}
+        if crosses:
+            with pytest.raises(ValidationError, match=r"(?s)tangent_angle.*does not cross itself"):
+                Vesicle.model_validate(fields)
+        else:
+            Vesicle.model_validate(fields)
+
+
 def test_shapes_overlap_where_their_outlines_do() -> None:
     """The bent one leaves room where an ellipse of its size would have none."""
     hollow, small = bean(), {"length": 0.5, "reduced_area": 0.99}
