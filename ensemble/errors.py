@@ -33,6 +33,10 @@ class OtherVersionError(StoreError):
     """A record that another version wrote and that this one cannot read."""
 
 
+class UnfinishedRunError(StoreError):
+    """What is kept of a run that is not done cannot be used; the message says what to do, or what follows."""
+
+
 class StoreInputError(BadInput, ValueError):
     """The named store, run, boundary or filter does not exist or is not valid; the message names it."""
 

@@ -18,7 +18,7 @@ from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 
 from ensemble.config.validation import describe
-from ensemble.errors import BadInput, StoreError
+from ensemble.errors import BadInput, StoreError, UnfinishedRunError
 from ensemble.store.sql_database import reason
 
 MEDIA_TYPE = "application/problem+json"
@@ -105,6 +105,7 @@ def install_handlers(app: FastAPI, missing: Iterable[type[Exception]]) -> None:
     app.add_exception_handler(RequestValidationError, _validation_error)
     app.add_exception_handler(BadInput, _bad_input)
     app.add_exception_handler(StoreError, _damage)
+    app.add_exception_handler(UnfinishedRunError, _useless_checkpoint)
     app.add_exception_handler(ClientDisconnect, _incomplete_body)
     for trouble in OUTAGES:
         app.add_exception_handler(trouble, _outage)
@@ -179,6 +180,11 @@ def _damage(request: Request, error: Exception) -> Response:
         "what is stored is damaged; `ensemble check --repair` sets it aside, so that it can be made again"
     )
     return problem_response(Problem(HTTPStatus.CONFLICT, detail))
+
+
+def _useless_checkpoint(request: Request, error: Exception) -> Response:
+    _log.error("%s: %s", request.url.path, error)
+    return problem_response(Problem(HTTPStatus.CONFLICT, str(error)))
 
 
 def unavailable(what: str) -> Problem:

@@ -75,6 +75,8 @@ def get_unfinished_run(reader: Reader, key: RunKey) -> Response:
     ------
     NotStored
         If no run of this key has a checkpoint.
+    UnfinishedRunError
+        If what is kept of the run cannot be used; the answer says to ask again, or that it begins anew.
     """
     return json_response(UnfinishedDocument.model_validate(_found(reader.service, key).json_document()))
 
@@ -112,6 +114,8 @@ def get_unfinished_series(
     ------
     NotStored
         If no run of this key has a checkpoint.
+    UnfinishedRunError
+        If what is kept of the run cannot be used; the answer says to ask again, or that it begins anew.
     BadInput
         If there is no diagnostic of a name, or there are too many records for one answer.
     """

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ensemble.config.run_key import run_key
 from ensemble.disk import flush
@@ -88,7 +88,7 @@ class Checkpoint:
             "record": {"writer": writer, "counts": self.record.counts, "rows": self.record.rows},
         }
         try:
-            write_plain(unfinished, content, self._attributes() | {"writer": writer})
+            write_plain(unfinished, content, _attributes(self.key) | {"writer": writer})
             flush(unfinished)
             unfinished.replace(path)
         finally:
@@ -110,22 +110,10 @@ class Checkpoint:
             If there is a file from which the run cannot go on; the message says why.  One of an earlier
             `RESULTS_REVISION` is removed.
         """
-        from ensemble.store.plain_hdf5 import UnreadableFileError, read_attributes, read_plain
-
-        path = checkpoint_path(self._store, self.key)
-        if not path.exists():
+        if not checkpoint_path(self._store, self.key).exists():
             self._remove_earlier_ones()
             return None
-        try:
-            attributes = read_attributes(path)
-            for name, expected in self._attributes().items():
-                if attributes.get(name) != expected:
-                    raise StoreError(f"it has the {name} {attributes.get(name)}, and not {expected}")
-            content = read_plain(path)
-        except UnreadableFileError as error:
-            raise StoreError(f"it is damaged ({error})") from error
-        if not isinstance(content, dict) or "record" not in content:
-            raise StoreError("an earlier version wrote it")
+        content = read_checkpoint(self._store, self.key)
         self.record.take_over(content["record"]["writer"], content["record"]["counts"])
         saved: Saved = content["simulation"]
         return saved
@@ -139,9 +127,6 @@ class Checkpoint:
         """Leave it to others, and remove what this process has recorded unless it counts that."""
         if _writer_of_checkpoint(self._store, self.key) != self._own_directory().name:
             self.record.remove()
-
-    def _attributes(self) -> dict[str, str | int]:
-        return {"key": self.key, "results_revision": RESULTS_REVISION}
 
     def _remove_earlier_ones(self) -> None:
         """Remove what no later run can go on from, and say so."""
@@ -172,6 +157,42 @@ def checkpoint_path(store: Path, key: str) -> Path:
     Path
     """
     return store / CHECKPOINTS / f"{key}{SUFFIX}"
+
+
+def read_checkpoint(store: Path, key: str) -> dict[str, Any]:
+    """Read what the checkpoint of a run holds.
+
+    Parameters
+    ----------
+    store : Path
+        Directory of the store.
+    key : str
+        Of the run.
+
+    Returns
+    -------
+    dict
+        ``scene``, ``simulation`` and ``record``, as `Checkpoint.write` wrote them.
+
+    Raises
+    ------
+    StoreError
+        If the run cannot go on from it; the message says why, without the name of the run.
+    """
+    from ensemble.store.plain_hdf5 import UnreadableFileError, read_attributes, read_plain
+
+    path = checkpoint_path(store, key)
+    try:
+        attributes = read_attributes(path)
+        for name, expected in _attributes(key).items():
+            if attributes.get(name) != expected:
+                raise StoreError(f"it has the {name} {attributes.get(name)}, and not {expected}")
+        content = read_plain(path)
+    except UnreadableFileError as error:
+        raise StoreError(f"it is damaged ({error})") from error
+    if not isinstance(content, dict) or "record" not in content:
+        raise StoreError("an earlier version wrote it")
+    return content
 
 
 def remove_checkpoint(store: Path, key: str) -> None:
@@ -248,6 +269,11 @@ def unfinished_keys(store: Path) -> set[str]:
     """
     recorded = (path.name for path in (store / CHECKPOINTS).glob("*") if is_own_directory(path))
     return {*checkpointed_keys(store), *recorded}
+
+
+def _attributes(key: str) -> dict[str, str | int]:
+    """Return what the file of a checkpoint says about itself, but for its writer."""
+    return {"key": key, "results_revision": RESULTS_REVISION}
 
 
 def _writer_of_checkpoint(store: Path, key: str) -> str | None:

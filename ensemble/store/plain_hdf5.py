@@ -8,6 +8,7 @@ chunk has a checksum.
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
@@ -21,7 +22,7 @@ _BYTES = "uint8"
 
 
 class UnreadableFileError(ValueError):
-    """A file is damaged, or holds something else."""
+    """A file is damaged, or holds something else; the message is a few words that say why."""
 
 
 def write_plain(path: Path, value: Any, attributes: Mapping[str, str | int]) -> None:
@@ -99,7 +100,8 @@ def _reading(path: Path, read: Callable[[h5py.File], Any]) -> Any:
         with h5py.File(path, "r", locking=False) as file:
             return read(file)
     except (OSError, LookupError, TypeError, ValueError, RuntimeError) as error:
-        raise UnreadableFileError(" ".join(str(error).split())) from error
+        number = getattr(error, "errno", None)  # of the operating system; what HDF5 says is of its own code
+        raise UnreadableFileError(os.strerror(number) if number else "cut short or changed") from error
 
 
 def _put(group: h5py.Group, name: str, numbers: NDArray[Any]) -> None:

@@ -114,18 +114,16 @@ class RecordedBlocks(Sink):
         StoreError
             If any is missing or damaged, or the disk does not take them.
         """
-        from ensemble.store.plain_hdf5 import UnreadableFileError, read_plain
-
         source = self._place / writer
         try:
             for part, count in counts.items():
                 for number in range(count):
+                    read_block(source, part, number)
                     path = source / _name(part, number)
-                    read_plain(path)
                     if source != self._directory:
                         _linked(path, self._made_directory() / path.name)
-        except (OSError, UnreadableFileError) as error:
-            raise StoreError(f"what it has recorded is damaged ({error})") from error
+        except OSError as error:
+            raise StoreError(f"what it has recorded cannot be taken over ({error.strerror})") from error
         self._has_files |= source == self._directory
 
     def parts(self, points: int | None) -> dict[str, dict[str, RecordedArray]]:
@@ -253,14 +251,14 @@ def read_block(directory: Path, part: str, number: int) -> Block:
     Raises
     ------
     StoreError
-        If it is missing or damaged.
+        If it is missing or damaged; the message says so without the name of the run.
     """
     from ensemble.store.plain_hdf5 import UnreadableFileError, read_plain
 
     try:
         block: Block = read_plain(directory / _name(part, number))
     except UnreadableFileError as error:
-        raise StoreError(f"run {directory.parent.name}: what it has recorded is damaged ({error})") from error
+        raise StoreError(f"what it has recorded is damaged ({_name(part, number)}: {error})") from error
     return block
 
 

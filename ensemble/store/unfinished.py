@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, Self
 
 from pydantic import ValidationError
 
-from ensemble.errors import StoreError, StoreInputError
-from ensemble.store.checkpoint import CHECKPOINTS, checkpoint_path, checkpointed_keys
+from ensemble.errors import StoreError, StoreInputError, UnfinishedRunError
+from ensemble.store.checkpoint import CHECKPOINTS, checkpoint_path, checkpointed_keys, read_checkpoint
 from ensemble.store.writers import STAGING, lives
 from solver.scene import Scene
 
@@ -29,6 +29,7 @@ class UnfinishedRun:
     Attributes
     ----------
     key : str
+    checkpoint : Path
     scene : Scene
     written : datetime
         When the checkpoint was written.
@@ -45,6 +46,7 @@ class UnfinishedRun:
     """
 
     key: str
+    checkpoint: Path
     scene: Scene
     written: datetime
     in_progress: bool
@@ -70,27 +72,31 @@ class UnfinishedRun:
 
         Raises
         ------
-        StoreError
-            If there is none that can be read.
+        UnfinishedRunError
+            If there is none from which the run can go on.
         """
-        from ensemble.store.plain_hdf5 import UnreadableFileError, read_plain
-
         path = checkpoint_path(store, key)
         try:
-            content = read_plain(path)
+            written = _written(path)  # before it is read, as it may be replaced at any time
+            content = read_checkpoint(store, key)
             record = content["record"]
             return cls(
                 key=key,
+                checkpoint=path,
                 scene=Scene.model_validate_json(content["scene"]),
-                written=datetime.fromtimestamp(path.stat().st_mtime, UTC),
+                written=written,
                 in_progress=lives(store / STAGING / record["writer"]),
                 saved=content["simulation"],
                 place=store / CHECKPOINTS / key / record["writer"],
                 counts=record["counts"],
                 rows=record["rows"],
             )
-        except (OSError, UnreadableFileError, LookupError, TypeError, ValidationError) as error:
-            raise StoreError(f"run {key}: its checkpoint cannot be read ({error})") from error
+        except OSError as error:
+            raise _useless(key, error.strerror or "it cannot be read") from error
+        except StoreError as error:
+            raise _useless(key, str(error)) from error
+        except (LookupError, TypeError, ValidationError) as error:
+            raise _useless(key, "another version wrote it") from error
 
     @property
     def time(self) -> float | None:
@@ -117,18 +123,54 @@ class UnfinishedRun:
 
         Raises
         ------
-        StoreError
-            If what was recorded cannot be read, which happens while a run is being finished.
+        UnfinishedRunError
+            If what was recorded cannot be read: it is damaged, or the run goes on or ends meanwhile.
         """
-        from ensemble.store.recorded_blocks import read_block
         from solver.analysis.record import InMemory
         from solver.simulation.run_so_far import run_so_far
 
         memory = InMemory()
+        for part, block in self.blocks():
+            memory.take(part, block)
+        return run_so_far(self.scene, self.saved, memory)
+
+    def blocks(self) -> Iterator[tuple[str, Block]]:
+        """Read all blocks that the checkpoint counts.
+
+        Yields
+        ------
+        str
+            The part of the record.
+        dict of str to array
+            The block.
+
+        Raises
+        ------
+        UnfinishedRunError
+            If they cannot be read; see `run`.
+        """
         for part, count in self.counts.items():
             for number in range(count):
-                memory.take(part, read_block(self.place, part, number))
-        return run_so_far(self.scene, self.saved, memory)
+                yield part, self._block(part, number)
+
+    def _block(self, part: str, number: int) -> Block:
+        from ensemble.store.recorded_blocks import read_block
+
+        try:
+            return read_block(self.place, part, number)
+        except StoreError as error:
+            # A process removes its blocks when it has staged the run, some time before that is committed.
+            if self.in_progress or self._is_replaced():
+                raise UnfinishedRunError(
+                    f"run {self.key}: it goes on or ends, and its record cannot be read now; try again"
+                ) from error
+            raise _useless(self.key, str(error)) from error
+
+    def _is_replaced(self) -> bool:
+        try:
+            return _written(self.checkpoint) != self.written
+        except FileNotFoundError:
+            return True
 
     def series(self) -> dict[str, RecordedArray]:
         """Return the diagnostics that have been recorded, to read some of their rows.
@@ -140,10 +182,10 @@ class UnfinishedRun:
 
         Raises
         ------
-        StoreError
+        UnfinishedRunError
             If they cannot be read; see `run`.
         """
-        from ensemble.store.recorded_blocks import read_block, recorded_arrays
+        from ensemble.store.recorded_blocks import recorded_arrays
         from solver.analysis.record import SERIES
         from solver.simulation.run_so_far import open_blocks
 
@@ -151,7 +193,7 @@ class UnfinishedRun:
         count = written + (last is not None)
 
         def read(number: int) -> Block:
-            return last if last is not None and number == written else read_block(self.place, SERIES, number)
+            return last if last is not None and number == written else self._block(SERIES, number)
 
         return recorded_arrays(count, read) if count else {}
 
@@ -204,13 +246,13 @@ def unfinished_run(store: Path, beginning: str) -> UnfinishedRun | None:
     ------
     StoreInputError
         If there are several.
-    StoreError
-        If the checkpoint cannot be read.
+    UnfinishedRunError
+        If the run cannot go on from its checkpoint.
     """
     keys = sorted(key for key in checkpointed_keys(store) if beginning and key.startswith(beginning))
     if len(keys) > 1:
         raise StoreInputError(f"run: {beginning} is the beginning of several keys: {', '.join(keys[:5])}")
-    return UnfinishedRun.read(store, keys[0]) if keys else None
+    return _read_if_there(store, keys[0]) if keys else None
 
 
 def interrupted_runs(store: Path) -> Iterator[str]:
@@ -228,14 +270,36 @@ def interrupted_runs(store: Path) -> Iterator[str]:
     """
     for key in sorted(checkpointed_keys(store)):
         try:
-            unfinished = UnfinishedRun.read(store, key)
-        except StoreError as error:
-            if checkpoint_path(store, key).exists():  # else the run has just been finished
-                yield str(error)
-            continue
-        if not unfinished.in_progress:
+            unfinished = _read_if_there(store, key)
+            if unfinished is None or unfinished.in_progress:
+                continue
+            for _ in unfinished.blocks():
+                pass
+        except UnfinishedRunError as error:
+            yield str(error)
+        else:
             written = f"{unfinished.written:%Y-%m-%d %H:%M} UTC"
             yield (
                 f"run {key}: interrupted {unfinished.progress}, {written}; the next command that needs it "
                 "goes on from there"
             )
+
+
+def _read_if_there(store: Path, key: str) -> UnfinishedRun | None:
+    """Read a checkpoint; None if it is gone, because its run has just been finished or dropped."""
+    try:
+        return UnfinishedRun.read(store, key)
+    except UnfinishedRunError:
+        if checkpoint_path(store, key).exists():
+            raise
+        return None
+
+
+def _written(checkpoint: Path) -> datetime:
+    return datetime.fromtimestamp(checkpoint.stat().st_mtime, UTC)
+
+
+def _useless(key: str, reason: str) -> UnfinishedRunError:
+    return UnfinishedRunError(
+        f"run {key}: its checkpoint cannot be used: {reason}; the next command that needs the run begins anew"
+    )

@@ -3,23 +3,30 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+import os
+import re
+import shutil
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from ensemble.config.figure_options import USUAL
-from ensemble.errors import StoreError, StoreInputError
+from ensemble.errors import StoreError, StoreInputError, UnfinishedRunError
 from ensemble.questions import kinds
 from ensemble.store import RunStaging, Store
 from ensemble.store.checkpoint import CHECKPOINTS, checkpoint_path
+from ensemble.store.plain_hdf5 import read_plain, write_plain
 from ensemble.store.unfinished import UnfinishedRun, interrupted_runs, unfinished_run
 from solver import Outcome, Simulation, simulate
+from solver.revision import RESULTS_REVISION
 from solver.scene import Output, Scene
 from tests.solver.restarts import PAIR, RELAXED, SCENES
 
+ANEW = "; the next command that needs the run begins anew"
 DENSE = Output(interval=0.01, frame_interval=0.02)
+DENSE_PAIR = PAIR.model_copy(update={"output": DENSE})
 
 
 @pytest.fixture
@@ -108,8 +115,62 @@ def test_those_that_nobody_goes_on_with_are_named(tmp_path: Path, staging: RunSt
     assert list(interrupted_runs(staging.path)) == [line]
     checkpoint_path(staging.path, key).write_bytes(b"torn")
     (line,) = interrupted_runs(staging.path)
-    assert line.startswith(f"run {key}: its checkpoint cannot be read")
-    with pytest.raises(StoreError, match="cannot be read"):
+    assert line == f"run {key}: its checkpoint cannot be used: it is damaged (cut short or changed){ANEW}"
+    with pytest.raises(UnfinishedRunError, match="cannot be used"):
+        unfinished_run(staging.path, key)
+
+
+@pytest.mark.parametrize(
+    ("damage", "reason"),
+    [
+        (Path.unlink, "No such file or directory"),
+        (lambda block: os.truncate(block, block.stat().st_size // 2), "cut short or changed"),
+    ],
+    ids=["gone", "torn"],
+)
+def test_one_whose_blocks_are_damaged_begins_anew(
+    staging: RunStaging, damage: Callable[[Path], None], reason: str
+) -> None:
+    with RunStaging(staging.path) as other:
+        key = kept_after(other, DENSE_PAIR, 20)
+    seen = UnfinishedRun.read(staging.path, key)
+    block = seen.place / "series-000000.h5"
+    damage(block)
+    expected = f"what it has recorded is damaged ({block.name}: {reason}){ANEW}"
+    (line,) = interrupted_runs(staging.path)
+    assert line == f"run {key}: its checkpoint cannot be used: {expected}"
+    with pytest.raises(StoreError, match=block.name):  # and so it is when a command needs the run
+        staging.checkpoint(DENSE_PAIR).read()
+    with pytest.raises(UnfinishedRunError, match=re.escape(expected)):
+        seen.run()
+
+
+def test_one_that_goes_on_or_ends_while_it_is_read_is_not_called_damaged(staging: RunStaging) -> None:
+    with RunStaging(staging.path) as other:
+        key = kept_after(other, DENSE_PAIR, 20)
+    interrupted = UnfinishedRun.read(staging.path, key)
+    again = kept_after(staging, DENSE_PAIR, 25)  # and the blocks of the process that has ended are removed
+    assert again == key
+    going_on = UnfinishedRun.read(staging.path, key)
+    shutil.rmtree(going_on.place)  # as when the run is staged
+    for seen in (interrupted, going_on):
+        for read in (seen.run, seen.series):
+            with pytest.raises(UnfinishedRunError, match=f"run {key}: it goes on or ends, .*; try again"):
+                read()
+    staging.checkpoint(DENSE_PAIR).remove()
+    assert unfinished_run(staging.path, key) is None
+
+
+def test_one_of_an_earlier_version_is_called_so(staging: RunStaging) -> None:
+    key = kept_after(staging, PAIR, 5)
+    path = checkpoint_path(staging.path, key)
+    content = read_plain(path)
+    del content["record"]
+    path.unlink()
+    write_plain(path, content, {"key": key, "results_revision": RESULTS_REVISION})
+    expected = f"run {key}: its checkpoint cannot be used: an earlier version wrote it{ANEW}"
+    assert list(interrupted_runs(staging.path)) == [expected]
+    with pytest.raises(UnfinishedRunError, match=re.escape(expected)):
         unfinished_run(staging.path, key)
 
 
