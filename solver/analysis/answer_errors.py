@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -90,7 +91,8 @@ class AnswerErrors(Remembering):
         if tracker is None or step.error is None:
             return
         for time in tracker.latest:
-            error_of_time = _time_error(step, time, tracker.angle_of) if time > 0 else np.zeros(2)
+            angle = partial(tracker.angle_of, time=time)
+            error_of_time = _time_error(step, time, angle) if time > 0 else np.zeros(2)
             self._at_passages = [*self._at_passages, error_of_time][-3:]
         if tracker.latest:
             begin = tracker.passages[-3:][0]

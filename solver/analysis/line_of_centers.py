@@ -85,7 +85,7 @@ class LineOfCenters(RevolutionTracker):
         """
         if self.distance_of(step.state) >= self.separated_distance:
             self.separated = True
-            step = step.until(crossing(step, lambda state: self.distance_of(state) - self.separated_distance))
+            step = step.until(crossing(step, self._beyond_separation))
         step = super().advance(step)
         self.distance = self.distance_of(step.state)
         self._follow_opening(step)
@@ -122,6 +122,9 @@ class LineOfCenters(RevolutionTracker):
         float
         """
         return math.hypot(*self._offset(state))
+
+    def _beyond_separation(self, state: Array, time: float) -> float:
+        return self.distance_of(state) - self.separated_distance
 
     def _direction(self, state: Array) -> float:
         x, y = self._offset(state)

@@ -180,7 +180,7 @@ class Recorder(Remembering):
         sample |= {name: float(measure(motion)) for name, measure in self._measures.items()}
         if self._line_of_centers:
             sample["center_distance"] = self._line_of_centers.distance_of(state)
-            sample["center_angle"] = self._line_of_centers.angle_of(state)
+            sample["center_angle"] = self._line_of_centers.angle_of(state, time)
         # Between samples: at one, the rate of a stiff state magnifies the noise of the integrator.
         if self._previous:
             change, duration = state - self._previous[1], time - self._previous[0]

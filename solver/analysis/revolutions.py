@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from solver.flows import ImposedFlow
     from solver.integrators import Step
     from solver.membrane.geometry import Membranes
+    from solver.memory import Saved
     from solver.scene import Scene
 
 Array = NDArray[np.float64]
@@ -26,6 +27,7 @@ Array = NDArray[np.float64]
 _NODES = np.cos(np.pi * np.arange(5) / 4)  # Chebyshev's, on [-1, 1]
 _COEFFICIENTS = np.linalg.inv(np.vander(_NODES, increasing=True))  # of the polynomial through values at them
 _ROUND_OFF = 1e-6  # half turns
+_FOLLOWED = np.pi / 8  # turn of a tangent through which a line is followed at once, well below a quarter turn
 # A line may be counted in this many directions, from that of the y axis on.
 _DIRECTIONS = np.pi / 2 + np.linspace(0.0, np.pi, 180, endpoint=False)
 
@@ -67,7 +69,10 @@ def counted_direction(flow: ImposedFlow | None) -> CountedDirection:
 
 
 class RevolutionTracker(Remembering, ABC):
-    """Follows the angle of a line from step to step.
+    """Follows the angle of a line through every step.
+
+    A direction says nothing of whole turns, and a step in a flow that rotates may be longer than one.  The
+    tangent angles of a state do, so they say at how many times within a step the direction is taken.
 
     Parameters
     ----------
@@ -100,7 +105,22 @@ class RevolutionTracker(Remembering, ABC):
         self.membranes = membranes
         self._counted = counted
         self.angle = self._direction(state)
+        self._stand()
         self.count_from_here()
+
+    def restore(self, saved: Saved) -> None:
+        """Remember what another one did; see `Remembering`.
+
+        Parameters
+        ----------
+        saved : dict
+        """
+        super().restore(saved)
+        self._stand()
+
+    def _stand(self) -> None:
+        """Take the angle as that of any time: no step has been followed."""
+        self._times, self._angles = np.zeros(1), np.array([self.angle])
 
     def count_from_here(self) -> None:
         """Count passages from the end of the last step on: what was before is no part of the motion now."""
@@ -126,30 +146,29 @@ class RevolutionTracker(Remembering, ABC):
         Step
             The part that was followed.
         """
-        angle = self.angle_of(step.state)
+        self._follow(step)
         self.latest = []
-        while self._half_turns(angle) >= self._first + self.count:
+        while self._half_turns(self.angle) >= self._first + self.count:
             self.latest.append(crossing(step, self._beyond_next_passage))
             self.count += 1
         self.passages = [*self.passages, *self.latest][-KEPT_HALF_TURNS - 1 :]
-        self.angle = angle
         return step
 
-    def angle_of(self, state: Array) -> float:
-        """Return the angle of the line in a state close to that of the last step.
+    def angle_of(self, state: Array, time: float) -> float:
+        """Return the angle of the line in a state close to that at a time within the last step.
 
         Parameters
         ----------
         state : (state_size,)
-            Its angle differs from that of the last step by less than half the direction's period.
+            Its angle differs from the one at that time by less than half the direction's period.
+        time : float
 
         Returns
         -------
         float
             Radians, unwrapped.
         """
-        angle = self._direction(state)
-        return angle + self.direction_period * round((self.angle - angle) / self.direction_period)
+        return self._unwrapped(state, float(np.interp(time, self._times, self._angles)))
 
     @property
     def half_turns(self) -> int:
@@ -189,8 +208,30 @@ class RevolutionTracker(Remembering, ABC):
         """Return how many half turns a line at an angle is beyond the counted direction."""
         return self._counted.sense * (angle - self._counted.angle) / np.pi
 
-    def _beyond_next_passage(self, state: Array) -> float:
-        return self._half_turns(self.angle_of(state)) - (self._first + self.count)
+    def _beyond_next_passage(self, state: Array, time: float) -> float:
+        return self._half_turns(self.angle_of(state, time)) - (self._first + self.count)
+
+    def _follow(self, step: Step) -> None:
+        """Unwrap the angle at times within a step between which no tangent turns far."""
+        tangent_angle = self.membranes.tangent_angle
+        times, angles, to_come = [step.start], [self.angle], [step.end]
+        tangents = tangent_angle(step.interpolate(step.start))
+        while to_come:
+            time = to_come[-1]
+            state = step.state if time == step.end else step.interpolate(time)
+            turned = tangent_angle(state)
+            if np.abs(turned - tangents).max() > _FOLLOWED:
+                to_come.append(0.5 * (times[-1] + time))
+                continue
+            times.append(to_come.pop())
+            angles.append(self._unwrapped(state, angles[-1]))
+            tangents = turned
+        self._times, self._angles = np.array(times), np.array(angles)
+        self.angle = angles[-1]
+
+    def _unwrapped(self, state: Array, near: float) -> float:
+        angle = self._direction(state)
+        return angle + self.direction_period * round((near - angle) / self.direction_period)
 
 
 class LongAxisTracker(RevolutionTracker):
@@ -247,14 +288,14 @@ def greatest(step: Step, quantity: Callable[[Array], float], first: float, last:
     return float(max(values.max(), *polynomial(inside)))
 
 
-def crossing(step: Step, excess: Callable[[Array], float]) -> float:
+def crossing(step: Step, excess: Callable[[Array, float], float]) -> float:
     """Return the time within a step at which a function of the state becomes positive.
 
     Parameters
     ----------
     step : Step
     excess : callable
-        From a state to a number that is positive at the end of the step.
+        From a state and its time to a number that is positive at the end of the step.
 
     Returns
     -------
@@ -262,7 +303,7 @@ def crossing(step: Step, excess: Callable[[Array], float]) -> float:
     """
 
     def excess_at(time: float) -> float:
-        return excess(step.interpolate(time))
+        return excess(step.interpolate(time), time)
 
     if excess_at(step.start) >= 0:  # the interpolant may differ from the previous one by the tolerance
         return step.start

@@ -63,7 +63,7 @@ def _inclination_error(scene: Scene, loop: TimeLoop, error: Array) -> float | No
         return None
 
     def angle(state: Array) -> float:
-        radians = tracker.angle_of(state)
+        radians = tracker.angle_of(state, loop.time)
         return float(np.degrees(radians) if one else pair_inclination(np.array(radians)))
 
     return magnitude(change_of(angle, loop.state, error))
