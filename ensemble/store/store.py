@@ -365,12 +365,20 @@ class Store(AbstractContextManager["Store"]):
         Raises
         ------
         NotStored
-            If there is no such run.
+            If there is no such run, or it has not ended; then the message says how far it is.
         StoreInputError
             If there are several; names some of them.
+        UnfinishedRunError
+            If it has not ended, and cannot go on from its checkpoint.
         """
+        from ensemble.store.unfinished import unfinished_run
+
         keys = self._catalog.keys_from(beginning, _CANDIDATES) if beginning else []
         if not keys:
+            if unfinished := unfinished_run(self.path, beginning):
+                raise NotStored(
+                    f"run: {unfinished.key} has not ended: {unfinished.status} {unfinished.progress}"
+                )
             raise NotStored(f"run: there is no run {beginning} in {self.path}")
         if len(keys) > 1:
             raise StoreInputError(f"run: {beginning} is the beginning of several keys: {', '.join(keys)}")

@@ -106,6 +106,11 @@ class UnfinishedRun:
         return time_so_far(self.saved)
 
     @property
+    def status(self) -> str:
+        """Whether a process goes on with it, in words."""
+        return "in progress" if self.in_progress else "interrupted"
+
+    @property
     def progress(self) -> str:
         """How far it has come, in words."""
         time = self.time
@@ -215,7 +220,7 @@ class UnfinishedRun:
 
         return {
             "run_key": self.key,
-            "status": "in progress" if self.in_progress else "interrupted",
+            "status": self.status,
             "written": self.written.isoformat(timespec="seconds"),
             "time": self.time,
             "horizon": self.scene.horizon,

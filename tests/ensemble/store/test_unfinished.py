@@ -174,7 +174,7 @@ def test_one_of_an_earlier_version_is_called_so(staging: RunStaging) -> None:
         unfinished_run(staging.path, key)
 
 
-def test_commands_tell_of_it(ensemble, staging: RunStaging) -> None:
+def test_commands_tell_of_it(ensemble, staging: RunStaging, tmp_path: Path) -> None:
     with RunStaging(staging.path) as other:
         key = kept_after(other, PAIR, 20)
         shown = ensemble("show", key[:8], f"--store={staging.path}", "--json")
@@ -183,6 +183,12 @@ def test_commands_tell_of_it(ensemble, staging: RunStaging) -> None:
         assert document["run_key"] == key
         assert document["status"] == "in progress"
         assert 0 < document["time"] < PAIR.horizon == document["horizon"]
+        progress = f"at time {document['time']:.6g} of {PAIR.horizon:g}"
+        for command in (["export", key[:8], tmp_path / "run.h5"], ["start-from", key[:8]]):
+            refused = ensemble(*map(str, command), f"--store={staging.path}")
+            assert refused.returncode == 2
+            assert f"{key} has not ended: in progress {progress}" in refused.stderr
+        assert not (tmp_path / "run.h5").exists()
     checked = ensemble("check", f"--store={staging.path}")
     assert checked.returncode == 0
     whole, line = checked.stdout.splitlines()
