@@ -37,8 +37,8 @@ class Vesicle(Model):
         Of the long axis against x, radians; with a shape of its own, that by which the shape is turned.
     tangent_angle : tuple of float or None
         The shape in which it starts instead of an ellipse: tangent angles at points equispaced in arclength,
-        counterclockwise, radians.  `ensemble start-from` writes them.  Their reduced area may differ by 0.01
-        from the one above, which counts.
+        counterclockwise, radians, continued beyond ±π instead of jumping.  `ensemble start-from` writes them.
+        Their reduced area may differ by 0.01 from the one above, which counts.
     """
 
     reduced_area: float = Field(0.9, gt=0, le=1)
@@ -65,6 +65,13 @@ class Vesicle(Model):
         enclosed, gap = reduced_area_of(angles)
         if not gap < _MISMATCH or not 0 < enclosed < 1 + _MISMATCH:
             raise ValueError("must be those of a closed curve that is run through counterclockwise")
+        steps = np.abs(np.diff(angles, append=angles[0] + 2 * math.pi))
+        if steps.max() >= math.pi:
+            raise ValueError(
+                "must change by less than π from each angle to the next, and from the last to the first "
+                f"plus 2π, got {steps.max():.4g} after angle {steps.argmax()}: continue them beyond ±π, as "
+                "numpy.unwrap does"
+            )
         wanted = info.data.get("reduced_area")
         if wanted is not None and not abs(enclosed - wanted) < _MISMATCH:
             raise ValueError(f"have the reduced area {enclosed:.6g}, and reduced_area is {wanted:g}")

@@ -56,6 +56,19 @@ def test_bad_shapes_are_refused_by_name(shape: np.ndarray, message: str) -> None
         Vesicle(tangent_angle=tuple(shape.tolist()))
 
 
+def test_angles_that_jump_are_refused_instead_of_guessed() -> None:
+    """They describe the same curve, but cannot be interpolated."""
+    area, _ = reduced_area_of(BEAN)
+    wrapped = np.angle(np.exp(1j * BEAN))
+    for shape in (wrapped, np.roll(BEAN, 5)):
+        with pytest.raises(
+            ValidationError, match=r"(?s)tangent_angle.*less than π .* got 6\.\d+ after angle \d"
+        ):
+            Vesicle.model_validate({"reduced_area": area, "tangent_angle": tuple(shape.tolist())})
+    turned = np.unwrap(np.roll(wrapped, 5))
+    Vesicle.model_validate({"reduced_area": area, "tangent_angle": tuple(turned.tolist())})
+
+
 @pytest.mark.parametrize("count", [32, 64, 512])
 def test_a_shape_may_not_cross_itself(count: int) -> None:
     """Walls of this family meet at a = 1.1711, where ∫ cos(t + a sin 2t) dt from −π/2 to π/2 is 0."""
