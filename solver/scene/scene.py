@@ -124,6 +124,12 @@ class Scene(Model):
         deformation = self.start.deformation
         if deformation is None:
             return self
+        for index, vesicle in enumerate(self.vesicles):
+            if vesicle.is_circle:
+                raise ValueError(
+                    f"start.deformation: vesicle {index} is a circle (reduced area {vesicle.reduced_area:g}), "
+                    "which has no other shape of its length and area; leave the table out"
+                )
         # Two waves of the amplitude a take 4/3·a² of the reduced area: at most half of what it lacks to 1.
         roundest = max(vesicle.reduced_area for vesicle in self.vesicles)
         most = math.sqrt(3 / 8 * (1 - roundest))

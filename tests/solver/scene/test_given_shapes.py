@@ -124,3 +124,12 @@ def test_a_deformation_takes_no_more_area_than_there_is() -> None:
         Scene.model_validate(document | {"start": {"deformation": {"amplitude": 0.1}}})
     with pytest.raises(ValidationError, match="leave one of the two out"):
         Start.model_validate({"relaxed": True, "deformation": {"amplitude": 0.1}})
+
+
+@pytest.mark.parametrize("area", [1.0, 1 - 1e-12])
+def test_a_circle_cannot_be_deformed(area: float) -> None:
+    vesicles = [{"reduced_area": 0.9}, {"reduced_area": area, "center": (4.0, 0.0)}]
+    with pytest.raises(ValidationError, match=r"start\.deformation: vesicle 1 is a circle"):
+        Scene.model_validate(
+            {"horizon": 1.0, "vesicles": vesicles, "start": {"deformation": {"amplitude": 1e-9}}}
+        )
