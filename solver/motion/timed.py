@@ -10,7 +10,6 @@ velocity of the points are linear.  So its derivative by time is the factor's sl
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -134,8 +133,8 @@ class TimedEquation:
     ) -> None:
         self._equation = equation
         self._flow = flow
-        self._pieces = protocol.pieces[: protocol.piece_at(time) + 1]
-        self._starts = [piece.start for piece in self._pieces]
+        self._protocol = protocol
+        self._last = protocol.piece_at(time)
 
     @property
     def evaluations(self) -> int:
@@ -264,7 +263,7 @@ class TimedEquation:
 
     def _piece_at(self, time: float) -> Piece:
         """Return the piece in which a time is; where the last one ends it still is in it."""
-        return self._pieces[bisect_right(self._starts, time) - 1]
+        return self._protocol.course.pieces[min(self._protocol.piece_at(time), self._last)]
 
     def _at(self, time: float) -> DenseEquation | SummedEquation:
         """Return the equation with the flow of a time."""

@@ -8,7 +8,8 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from bisect import bisect_right
 from collections.abc import Callable
-from itertools import pairwise
+from itertools import accumulate, pairwise
+from math import inf
 from typing import ClassVar, NamedTuple, Self
 
 from solver.model import Model
@@ -55,6 +56,39 @@ class Piece(NamedTuple):
         )
 
 
+class Course(NamedTuple):
+    """The pieces of a protocol, built once, to look times up in.
+
+    Attributes
+    ----------
+    pieces : tuple of Piece
+    breaks : tuple of float
+        When each but the first one begins.
+    integrals : tuple of float
+        Of the factor from 0 to the start of each.
+    """
+
+    pieces: tuple[Piece, ...]
+    breaks: tuple[float, ...]
+    integrals: tuple[float, ...]
+
+    @classmethod
+    def of(cls, pieces: tuple[Piece, ...]) -> Self:
+        """Return the course with these pieces.
+
+        Parameters
+        ----------
+        pieces : tuple of Piece
+
+        Returns
+        -------
+        Course
+        """
+        breaks = tuple(piece.start for piece in pieces[1:])
+        whole = (piece.integral(following.start) for piece, following in pairwise(pieces))
+        return cls(pieces, breaks, tuple(accumulate(whole, initial=0.0)))
+
+
 class RateProtocol(Model, ABC):
     """A factor of the flow's rate that depends on time.
 
@@ -65,6 +99,9 @@ class RateProtocol(Model, ABC):
     title : str
         The protocol in the words of a caption: "shear flow, …".
     """
+
+    # No field and not in the dictionary, so that neither copies with changes nor other ranks get it.
+    __slots__ = ("_course",)
 
     kind: str
 
@@ -86,9 +123,33 @@ class RateProtocol(Model, ABC):
         """The factor in the last piece if it is constant there; None if it never becomes constant."""
 
     @property
+    def course(self) -> Course:
+        """The pieces to look times up in; steps ask for it all the time."""
+        course: Course | None = getattr(self, "_course", None)
+        if course is None:
+            course = Course.of(self.pieces)
+            object.__setattr__(self, "_course", course)
+        return course
+
+    @property
     def breaks(self) -> tuple[float, ...]:
-        """The times at which the factor or its slope jumps."""
-        return tuple(piece.start for piece in self.pieces[1:])
+        """The times at which the factor or its slope jumps, in ascending order."""
+        return self.course.breaks
+
+    def next_break(self, time: float) -> float:
+        """Return the first break after a time.
+
+        Parameters
+        ----------
+        time : float
+
+        Returns
+        -------
+        float
+            Infinite after the last one.
+        """
+        index = self.piece_at(time)
+        return self.breaks[index] if index < len(self.breaks) else inf
 
     def piece_at(self, time: float) -> int:
         """Return the index of the piece in which a time is, at a break that of the one that begins.
@@ -114,7 +175,7 @@ class RateProtocol(Model, ABC):
         -------
         float
         """
-        return self.pieces[self.piece_at(time)].factor(time)
+        return self.course.pieces[self.piece_at(time)].factor(time)
 
     def integral(self, time: float) -> float:
         """Return the integral of the factor from 0 to a time.
@@ -128,6 +189,5 @@ class RateProtocol(Model, ABC):
         float
             In units of time.
         """
-        begun = self.pieces[: self.piece_at(time) + 1]
-        whole = sum(piece.integral(following.start) for piece, following in pairwise(begun))
-        return whole + begun[-1].integral(time)
+        index = self.piece_at(time)
+        return self.course.integrals[index] + self.course.pieces[index].integral(time)

@@ -168,7 +168,7 @@ class Scene(Model):
         """When the rate of the flow changes for the last time: 0 without a protocol, or infinite."""
         if self.protocol is None:
             return 0.0
-        return math.inf if self.protocol.lasting is None else max(0.0, *self.protocol.breaks, 0.0)
+        return math.inf if self.protocol.lasting is None else (0.0, *self.protocol.breaks[-1:])[-1]
 
     @property
     def highest_rate(self) -> float:

@@ -209,6 +209,7 @@ class TimeLoop(Remembering):
         TensionNotFoundError
             If the membranes are too distorted.
         """
+        latest = self._latest
         step = self.segment.step()
         require_agreement(self._parallel, step.end)
         points = self._resolution.finer(self.segment.membranes, step.end, step.state)
@@ -216,7 +217,7 @@ class TimeLoop(Remembering):
             self._refine(points)
             return False
         self._accept(step)
-        if self.time in self._breaks and not self.done:
+        if self.time >= latest and not self.done:
             self._pass_break()
         limit = self._scene.numerics.work_limit
         if self.segment.work.evaluations > limit:
@@ -224,14 +225,10 @@ class TimeLoop(Remembering):
         return True
 
     @property
-    def _breaks(self) -> tuple[float, ...]:
-        """When the rate of the flow, or its slope, jumps: no step goes on beyond."""
-        return self._scene.protocol.breaks if self._scene.protocol else ()
-
-    @property
     def _latest(self) -> float:
-        """When the present steps end at the latest."""
-        return min([each for each in self._breaks if each > self.time] + [self._scene.horizon])
+        """When the present steps end at the latest: no step goes on where the rate, or its slope, jumps."""
+        protocol, horizon = self._scene.protocol, self._scene.horizon
+        return min(protocol.next_break(self.time), horizon) if protocol else horizon
 
     def _clocked(self, state: Array) -> Array:
         """Return a state with its time, if the motion depends on it."""

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from solver.protocols import PROTOCOLS, Constant, Ramp, RateProtocol, Sine, Steps
-from solver.scene import Scene, Shear
+from solver.protocols import PROTOCOLS, Constant, Piece, Ramp, RateProtocol, Sine, Steps
+from solver.scene import Numerics, Scene, Shear
+from solver.simulation.simulate import simulate
 
 MANY = [
     Constant(),
@@ -56,6 +57,29 @@ def test_slopes_and_integrals_are_those_of_the_factor(protocol: RateProtocol) ->
     assert protocol.integral(0.0) == 0
     for end in protocol.breaks:
         assert protocol.integral(end - 1e-9) == pytest.approx(protocol.integral(end), abs=1e-8)
+
+
+def test_the_course_is_built_once_and_stays_with_its_protocol(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A time step asks for it many times, and a protocol may have thousands of pieces."""
+    built = []
+    pieces = Steps.pieces.fget
+
+    def counted(protocol: Steps) -> tuple[Piece, ...]:
+        built.append(protocol)
+        return pieces(protocol)
+
+    monkeypatch.setattr(Steps, "pieces", property(counted))
+    steps = Steps(times=(1.0, 4.0), factors=(1.0, 0.0, 2.5))
+    assert [steps.next_break(time) for time in (0.0, 1.0, 3.9, 4.0)] == [1.0, 4.0, 4.0, math.inf]
+    assert [steps.integral(time) for time in (0.5, 2.0, 6.0)] == [0.5, 1.0, 6.0]
+    assert steps.factor(5.0) == 2.5
+    short = Scene(horizon=2.0, vesicles=[{"reduced_area": 1.0}], flow=Shear(rate=0.5), protocol=steps)
+    simulate(short.model_copy(update={"numerics": Numerics(points=16, tolerance=1e-3)}))
+    assert built == [steps]
+    other = steps.model_copy(update={"factors": (1.0, 3.0, 2.5)})
+    assert other.factor(2.0) == 3.0
+    assert steps == pickle.loads(pickle.dumps(steps)) == Steps(times=steps.times, factors=steps.factors)
+    assert hash(steps) == hash(Steps(times=steps.times, factors=steps.factors))
 
 
 @every_protocol
