@@ -29,6 +29,7 @@ class Ramp(RateProtocol):
     duration: Annotated[Positive, TIME]
 
     title: ClassVar[str] = "with a ramp of the rate"
+    time_scale: ClassVar[str] = "duration"
 
     @property
     def pieces(self) -> tuple[Piece, ...]:

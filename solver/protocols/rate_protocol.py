@@ -98,6 +98,9 @@ class RateProtocol(Model, ABC):
         Tells the registered protocols apart; a literal with itself as the default.
     title : str
         The protocol in the words of a caption: "shear flow, …".
+    time_scale : str or None
+        Name of the field that says in which time the rate changes smoothly; a scene refuses values that are
+        too short beside its horizon.  None if the rate changes at breaks alone.
     """
 
     # No field and not in the dictionary, so that neither copies with changes nor other ranks get it.
@@ -106,6 +109,7 @@ class RateProtocol(Model, ABC):
     kind: str
 
     title: ClassVar[str]
+    time_scale: ClassVar[str | None] = None
 
     @property
     @abstractmethod

@@ -32,6 +32,7 @@ class Sine(RateProtocol):
     phase: Annotated[float, ANGLE] = 0.0
 
     title: ClassVar[str] = "with an oscillating rate"
+    time_scale: ClassVar[str] = "period"
 
     @property
     def pieces(self) -> tuple[Piece, ...]:

@@ -32,6 +32,9 @@ LARGEST_DENSE = 6
 # Samples, or frames, of a run: each costs an evaluation, which no work limit counts.
 MOST_RECORDS = 1_000_000
 
+# Of a protocol in a horizon: shorter ones are lost in the round-off of the time, and no step could end.
+MOST_TIME_SCALES = 1_000_000
+
 
 class Scene(Model):
     """Everything that a run depends on.
@@ -161,6 +164,18 @@ class Scene(Model):
             raise ValueError("protocol: there is no flow whose rate could change")
         if isinstance(self.protocol, Constant):
             object.__setattr__(self, "protocol", None)  # equal scenes are equal
+        return self
+
+    @model_validator(mode="after")
+    def _rates_that_steps_can_follow(self) -> Self:
+        name = self.protocol.time_scale if self.protocol else None
+        if name is None:
+            return self
+        least, given = self.horizon / MOST_TIME_SCALES, getattr(self.protocol, name)
+        if given < least:
+            raise ValueError(
+                f"protocol.{name} must be at least {least:g}, a millionth of the horizon, got {given:g}"
+            )
         return self
 
     @property

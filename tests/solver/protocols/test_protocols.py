@@ -115,6 +115,19 @@ def test_bad_ones_are_refused_by_name(protocol: str, message: str) -> None:
         scene(protocol)
 
 
+@pytest.mark.parametrize("given", ["kind = 'ramp', duration", "kind = 'sine', period"])
+def test_a_time_scale_is_no_shorter_than_a_millionth_of_the_horizon(given: str) -> None:
+    """With 1e-300 a run stood at time 0 for ever."""
+    for value in ("1e-300", "9.99e-6"):
+        with pytest.raises(ValidationError, match=f"protocol.{given.split()[-1]} must be at least 1e-05"):
+            scene(f"{{{given} = {value}}}")
+    shortest = scene(f"{{{given} = 1e-5}}")
+    short = Numerics(points=16, tolerance=1e-3, work_limit=200)
+    ended = simulate(shortest.model_copy(update={"numerics": short}))
+    assert ended.time > 0
+    assert ended.failure is None or "work limit" in ended.failure
+
+
 def test_a_protocol_needs_a_flow() -> None:
     with pytest.raises(ValidationError, match="protocol: there is no flow"):
         Scene.model_validate({"horizon": 1.0, "vesicles": [{}], "protocol": {"kind": "ramp", "duration": 1}})
