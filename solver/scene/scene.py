@@ -130,8 +130,9 @@ class Scene(Model):
         for index, vesicle in enumerate(self.vesicles):
             if vesicle.is_circle:
                 raise ValueError(
-                    f"start.deformation: vesicle {index} is a circle (reduced area {vesicle.reduced_area:g}), "
-                    "which has no other shape of its length and area; leave the table out"
+                    f"start.deformation: vesicle {index} is a circle (reduced area "
+                    f"{vesicle.reduced_area:g}), which has no other shape of its length and area; leave the "
+                    "table out"
                 )
         # Two waves of the amplitude a take 4/3·a² of the reduced area: at most half of what it lacks to 1.
         roundest = max(vesicle.reduced_area for vesicle in self.vesicles)
