@@ -19,12 +19,15 @@ class Constant(RateProtocol):
         """A single one."""
         return (Piece.line(0.0, 1.0),)
 
-    @property
-    def largest(self) -> float:
-        """1."""
-        return 1.0
+    def largest(self, horizon: float) -> float:
+        """Return 1; see `RateProtocol`.
 
-    @property
-    def lasting(self) -> float:
-        """1."""
+        Parameters
+        ----------
+        horizon : float
+
+        Returns
+        -------
+        float
+        """
         return 1.0

@@ -39,12 +39,15 @@ class Ramp(RateProtocol):
         changing = Piece.line(self.begin, self.start, slope)
         return (*before, changing, Piece.line(self.begin + self.duration, self.end))
 
-    @property
-    def largest(self) -> float:
-        """The larger one of start and end."""
-        return max(self.start, self.end)
+    def largest(self, horizon: float) -> float:
+        """Return the larger one of start and end; see `RateProtocol`.
 
-    @property
-    def lasting(self) -> float:
-        """The end."""
-        return self.end
+        Parameters
+        ----------
+        horizon : float
+
+        Returns
+        -------
+        float
+        """
+        return max(self.start, self.end) if self.begin < horizon else self.start

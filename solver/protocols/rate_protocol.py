@@ -6,7 +6,7 @@ A protocol is a factor of the flow's rate that is smooth but for a few times.  S
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections.abc import Callable
 from itertools import accumulate, pairwise
 from math import inf
@@ -26,12 +26,15 @@ class Piece(NamedTuple):
         The factor, and its derivative by time.
     integral : callable
         Of the factor since the start, in units of time.
+    constant : float or None
+        The factor if it does not change.
     """
 
     start: float
     factor: Callable[[float], float]
     slope: Callable[[float], float]
     integral: Callable[[float], float]
+    constant: float | None = None
 
     @classmethod
     def line(cls, start: float, factor: float, slope: float = 0.0) -> Self:
@@ -53,6 +56,7 @@ class Piece(NamedTuple):
             lambda time: factor + slope * (time - start),
             lambda time: slope,
             lambda time: (time - start) * (factor + 0.5 * slope * (time - start)),
+            factor if slope == 0 else None,
         )
 
 
@@ -116,15 +120,18 @@ class RateProtocol(Model, ABC):
     def pieces(self) -> tuple[Piece, ...]:
         """The smooth parts in their order, the first one from time 0 on."""
 
-    @property
     @abstractmethod
-    def largest(self) -> float:
-        """The largest magnitude of the factor."""
+    def largest(self, horizon: float) -> float:
+        """Return the largest magnitude of the factor before the horizon, or a bound of it.
 
-    @property
-    @abstractmethod
-    def lasting(self) -> float | None:
-        """The factor in the last piece if it is constant there; None if it never becomes constant."""
+        Parameters
+        ----------
+        horizon : float
+
+        Returns
+        -------
+        float
+        """
 
     @property
     def course(self) -> Course:
@@ -154,6 +161,19 @@ class RateProtocol(Model, ABC):
         """
         index = self.piece_at(time)
         return self.breaks[index] if index < len(self.breaks) else inf
+
+    def last_piece(self, horizon: float) -> int:
+        """Return the index of the piece in which a run ends: breaks at the horizon or later play no part.
+
+        Parameters
+        ----------
+        horizon : float
+
+        Returns
+        -------
+        int
+        """
+        return bisect_left(self.breaks, horizon)
 
     def piece_at(self, time: float) -> int:
         """Return the index of the piece in which a time is, at a break that of the one that begins.

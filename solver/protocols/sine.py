@@ -50,12 +50,15 @@ class Sine(RateProtocol):
             ),
         )
 
-    @property
-    def largest(self) -> float:
-        """Mean and amplitude together."""
-        return abs(self.mean) + self.amplitude
+    def largest(self, horizon: float) -> float:
+        """Return mean and amplitude together; see `RateProtocol`.
 
-    @property
-    def lasting(self) -> None:
-        """None: it goes on changing."""
-        return
+        Parameters
+        ----------
+        horizon : float
+
+        Returns
+        -------
+        float
+        """
+        return abs(self.mean) + self.amplitude

@@ -46,12 +46,15 @@ class Steps(RateProtocol):
         """One for each factor."""
         return tuple(map(Piece.line, (0.0, *self.times), self.factors))
 
-    @property
-    def largest(self) -> float:
-        """The largest factor."""
-        return max(self.factors)
+    def largest(self, horizon: float) -> float:
+        """Return the largest factor; see `RateProtocol`.
 
-    @property
-    def lasting(self) -> float:
-        """The last factor."""
-        return self.factors[-1]
+        Parameters
+        ----------
+        horizon : float
+
+        Returns
+        -------
+        float
+        """
+        return max(self.factors[: self.last_piece(horizon) + 1])

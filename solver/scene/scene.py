@@ -15,7 +15,7 @@ from solver.dimensions import TIME, UNITS
 from solver.flows import Flow, ImposedFlow
 from solver.model import Model, Positive
 from solver.pair_potentials import Adhesion
-from solver.protocols import Constant, FlowProtocol
+from solver.protocols import Constant, FlowProtocol, Piece
 from solver.scene.arrangement import Arrangement
 from solver.scene.criteria import Criteria
 from solver.scene.ellipses import overlapping_pair
@@ -181,17 +181,24 @@ class Scene(Model):
 
     @property
     def constant_from(self) -> float:
-        """When the rate of the flow changes for the last time: 0 without a protocol, or infinite."""
-        if self.protocol is None:
+        """When the rate of the flow is constant up to the horizon: 0 without a protocol, or infinite."""
+        last = self._last_piece
+        if last is None:
             return 0.0
-        return math.inf if self.protocol.lasting is None else (0.0, *self.protocol.breaks[-1:])[-1]
+        return math.inf if last.constant is None else last.start
+
+    @property
+    def _last_piece(self) -> Piece | None:
+        """What of the protocol the horizon comes in."""
+        protocol = self.protocol
+        return protocol.course.pieces[protocol.last_piece(self.horizon)] if protocol else None
 
     @property
     def highest_rate(self) -> float:
-        """The largest rate that the flow has, 0 without one."""
+        """The largest rate that the flow has up to the horizon, 0 without one."""
         if self.flow is None:
             return 0.0
-        return self.flow.rate * self.protocol.largest if self.protocol else self.flow.rate
+        return self.flow.rate * self.protocol.largest(self.horizon) if self.protocol else self.flow.rate
 
     @property
     def shear_rate(self) -> float | None:
@@ -200,10 +207,11 @@ class Scene(Model):
 
     @property
     def settled(self) -> Scene:
-        """The scene as it is once the rate of the flow does not change any more; otherwise itself."""
-        if self.flow is None or self.protocol is None or self.protocol.lasting is None:
+        """The scene as it is once the rate does not change up to the horizon; otherwise itself."""
+        last = self._last_piece
+        if self.flow is None or last is None or last.constant is None:
             return self
-        flow = self.flow.model_copy(update={"rate": self.flow.rate * self.protocol.lasting})
+        flow = self.flow.model_copy(update={"rate": self.flow.rate * last.constant})
         return self.model_copy(update={"flow": flow, "protocol": None})
 
     @property

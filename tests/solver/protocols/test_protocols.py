@@ -86,10 +86,13 @@ def test_the_course_is_built_once_and_stays_with_its_protocol(monkeypatch: pytes
 def test_what_a_protocol_says_of_itself(protocol: RateProtocol) -> None:
     times = np.linspace(0, 30, 3001)
     factors = np.array([protocol.factor(time) for time in times])
-    assert np.abs(factors).max() == pytest.approx(protocol.largest, rel=1e-4)
-    constant = np.ptp(factors[times >= max((0.0, *protocol.breaks))]) == 0
-    assert constant == (protocol.lasting is not None)
-    assert protocol.lasting in (None, factors[-1])
+    for horizon in (*protocol.breaks, 30.0):
+        assert np.abs(factors[times < horizon]).max() <= protocol.largest(horizon)
+        last = protocol.last_piece(horizon)
+        inside = factors[(times >= protocol.course.pieces[last].start) & (times < horizon)]
+        constant = inside[0] if np.ptp(inside) == 0 else None
+        assert protocol.course.pieces[last].constant == constant
+    assert np.abs(factors).max() == pytest.approx(protocol.largest(30.0), rel=1e-4)
     assert protocol.title
     assert pickle.loads(pickle.dumps(protocol)) == protocol  # ranks send scenes to each other
 

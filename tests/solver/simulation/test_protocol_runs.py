@@ -175,6 +175,39 @@ def test_a_pair_in_a_rate_that_never_stops_changing_is_followed_to_the_horizon()
     assert run.period is run.error.period is None
 
 
+def test_what_the_rate_does_from_the_horizon_on_plays_no_part() -> None:
+    """Not its jump to another rate, to none or at the horizon itself, and no ramp that begins there."""
+    pair = shear_pair(3.5, horizon=100.0, numerics=Numerics(points=32, tolerance=1e-3))
+    plain, *later = (
+        simulate(pair),
+        *(
+            simulate(changing(pair, protocol))
+            for protocol in (
+                Steps(times=(150.0,), factors=(1.0, 2.0)),
+                Steps(times=(100.0, 101.0), factors=(1.0, 0.0, 1000.0)),
+                Ramp(begin=100.0, duration=1.0, start=1.0, end=0.0),
+            )
+        ),
+    )
+    assert plain.outcome is Outcome.BOUND
+    assert plain.time < 100
+    for run in later:
+        assert run.outcome is plain.outcome
+        assert run.time == pytest.approx(plain.time, rel=1e-2)
+        assert run.period == pytest.approx(plain.period, rel=1e-2)
+        assert run.effective_aspect_ratio == pytest.approx(plain.effective_aspect_ratio, rel=1e-2)
+        assert (run.time, run.period, run.gap) == (later[0].time, later[0].period, later[0].gap)
+
+
+def test_a_ramp_that_the_horizon_cuts_off_is_followed_to_it() -> None:
+    ramp = Ramp(begin=10.0, duration=100.0, start=1.0, end=0.0)
+    run = simulate(
+        changing(shear_pair(3.5, horizon=20.0, numerics=Numerics(points=32, tolerance=1e-3)), ramp)
+    )
+    assert run.outcome is Outcome.COMPLETED
+    assert run.time == 20.0
+
+
 def test_turns_under_another_rate_do_not_count() -> None:
     """The pair turns four times as fast first; the period is that of the last rate."""
     slow = shear_pair(1.5, rate=0.5, horizon=400.0)
