@@ -116,7 +116,7 @@ def show(  # numpydoc ignore=PR01
     ] = None,
     size: Annotated[
         str | None,
-        typer.Option(metavar="WxH", help="Width and height of a figure in centimeters, such as 8.6x6."),
+        typer.Option(metavar="WxH", help="Width and height of a figure in centimeters, such as 8.6x20."),
     ] = None,
     dpi: Annotated[int, typer.Option(help="Points of a .png on an inch, from 30 to 1200.")] = 300,
     svg_text: Annotated[

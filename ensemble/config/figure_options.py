@@ -43,7 +43,7 @@ def parse_size(text: str) -> tuple[float, float]:
     Parameters
     ----------
     text : str
-        Such as ``8.6x6``.
+        Such as ``8.6x20``.
 
     Returns
     -------
@@ -56,5 +56,5 @@ def parse_size(text: str) -> tuple[float, float]:
     """
     match = _SIZE.fullmatch(text.strip())
     if match is None:
-        raise ValueError(f"size: {text!r} — must be width x height in centimeters, such as 8.6x6")
+        raise ValueError(f"size: {text!r} — must be width x height in centimeters, such as 8.6x20")
     return float(match[1]), float(match[2])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
@@ -16,6 +17,8 @@ from ensemble.figures.style import STYLE
 
 # The metadata that hold the date of a file are left out, so that equal figures are equal files.
 _UNDATED = {".png": {}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
+
+NO_ROOM: Final = "constrained_layout not applied"  # how the warning of the library begins
 
 FIGURE_SUFFIXES: Final = tuple(_UNDATED)
 
@@ -36,16 +39,23 @@ def save(figure: Figure, path: Path, options: FigureOptions = USUAL) -> None:
     Raises
     ------
     ValueError
-        For any other suffix.
+        For any other suffix, or if the figure has no room for its letters.
     """
     suffix = suffix_among(path, FIGURE_SUFFIXES)
     image = BytesIO()  # a disk may take only a part, which not every format can end
     if options.size is not None:
         width, height = options.size
         figure.set_size_inches((width / INCH, height / INCH))
-    with matplotlib.rc_context(STYLE):
+    with matplotlib.rc_context(STYLE), warnings.catch_warnings():
+        warnings.filterwarnings("error", NO_ROOM)
         matplotlib.rcParams["svg.fonttype"] = "none" if options.svg_text else "path"
-        figure.savefig(image, format=suffix[1:], dpi=options.dpi, metadata=_UNDATED[suffix])
+        try:
+            figure.savefig(image, format=suffix[1:], dpi=options.dpi, metadata=_UNDATED[suffix])
+        except UserWarning as warning:
+            width, height = figure.get_size_inches() * INCH
+            raise ValueError(
+                f"size: {width:.4g}x{height:.4g} is too small for the letters of this figure"
+            ) from warning
     with replacing(path) as unfinished:
         unfinished.write_bytes(image.getbuffer())
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import textwrap
 
 import matplotlib
@@ -27,16 +28,21 @@ _AROUND_SNAPSHOTS = 0.85  # for the times above them and the color bar below
 _CLUSTERS = (
     f"filled: vesicles nearer than {CONTACT:g} adhesion distances to each other, a color for each cluster"
 )
-_CHARACTERS = 105  # in a line of the heading
+_CHARACTERS = 105  # in a line of the heading of the usual width
+_UNSEEN = re.compile(r"(?<=\\.)[A-Za-z]+|[${}\\]")  # a command of TeX counts as one character
 
 
 @matplotlib.rc_context(STYLE)
-def run_figure(run: Run) -> Figure:
+def run_figure(run: Run, width: float = WIDTH, in_one_column: bool = False) -> Figure:
     """Draw snapshots colored by tension, and the diagnostics of a run against time.
 
     Parameters
     ----------
     run : Run
+    width : float
+        Inches.  A narrow figure has fewer snapshots.
+    in_one_column : bool
+        Whether all panels stand below each other.
 
     Returns
     -------
@@ -47,19 +53,22 @@ def run_figure(run: Run) -> Figure:
         not have is left out.
     """
     panels = {name: draw for name, draw in PANELS.items() if name in run.series}
-    columns = 3 if len(panels) == 3 else 2
+    columns = 1 if in_one_column else 3 if len(panels) == 3 else 2
     rows = math.ceil(len(panels) / columns)
-    heading = _heading(run)
+    characters = int(_CHARACTERS * width / WIDTH)
+    heading = _heading(run, characters)
+    chosen = choose_snapshots(run.frames, width)
 
     figure = Figure(layout="constrained")
     figure.suptitle("\n".join(heading), fontsize="medium")
     grid = figure.add_gridspec(2, 1)
     snapshots = figure.add_subplot(grid[0], label="membranes")
     clusters = _clusters(run)
-    membranes = draw_snapshots(snapshots, run.scene, run.frames, clusters)
+    membranes = draw_snapshots(snapshots, run.scene, run.frames, chosen, clusters)
     if clusters is not None:
+        explained = textwrap.fill(_CLUSTERS, characters)
         snapshots.annotate(
-            _CLUSTERS, (0, 0), (0, -2), "axes fraction", "offset points", va="top", fontsize="small"
+            explained, (0, 0), (0, -2), "axes fraction", "offset points", va="top", fontsize="small"
         )
     bar = add_tension_bar(figure, membranes, snapshots, extended_ends(membranes))
     bar.set_label(with_unit(r"tension $\sigma$", TENSION, run.scene))
@@ -71,12 +80,12 @@ def run_figure(run: Run) -> Figure:
         draw(axes, run)
         if row == rows - 1:
             axes.set_xlabel(with_unit("time $t$", TIME, run.scene))
-        for time in run.frames.time[choose_snapshots(run.frames)]:
+        for time in run.frames.time[chosen]:
             axes.axvline(time, color=GRAY, alpha=0.3, linewidth=0.7, zorder=0.5)
 
-    height = np.clip(WIDTH * np.ptp(snapshots.get_ylim()) / np.ptp(snapshots.get_xlim()), *_SNAPSHOTS)
+    height = np.clip(width * np.ptp(snapshots.get_ylim()) / np.ptp(snapshots.get_xlim()), *_SNAPSHOTS)
     grid.set_height_ratios([height, rows * _PANEL])
-    figure.set_size_inches(WIDTH, len(heading) * _LINE + height + _AROUND_SNAPSHOTS + rows * _PANEL)
+    figure.set_size_inches(width, len(heading) * _LINE + height + _AROUND_SNAPSHOTS + rows * _PANEL)
     return figure
 
 
@@ -89,11 +98,24 @@ def _clusters(run: Run) -> Array | None:
     return np.asarray(labels[nearest])
 
 
-def _heading(run: Run) -> list[str]:
-    """Return the scene in one line, then the outcome and the reason of a failure in lines that fit."""
+def _heading(run: Run, characters: int) -> list[str]:
+    """Return the scene, and the outcome with the reason of a failure, in lines that fit."""
     outcome = f"{run.outcome} at $t$ = {run.time:.4g}"
     if run.period is not None:
         outcome += f", period {run.period:.4g}" + (" (not settled)" if run.settled is False else "")
     if reason := run.failure or run.undecided:
         outcome += ": " + reason.replace("$", r"\$")
-    return [describe(run.scene), *textwrap.wrap(outcome, _CHARACTERS)]
+    return [*_lines(describe(run.scene), characters), *textwrap.wrap(outcome, characters)]
+
+
+def _lines(description: str, characters: int) -> list[str]:
+    """Break a description of a scene at its commas; what TeX does not show takes no room."""
+    lines = [""]
+    for part in description.split(", "):
+        longer = f"{lines[-1]}, {part}" if lines[-1] else part
+        if lines[-1] and len(_UNSEEN.sub("", longer)) > characters:
+            lines[-1] += ","
+            lines.append(part)
+        else:
+            lines[-1] = longer
+    return lines

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from ensemble.config.figure_options import USUAL, FigureOptions
 from ensemble.figures.figure_files import FIGURE_SUFFIXES, save, suffix_among
+from ensemble.figures.fitted import fitted_run_figure
 from ensemble.figures.history import run_figure
 from solver.analysis.run import Run
 
@@ -24,7 +25,7 @@ def draw_run(run: Run, output: Path, options: FigureOptions) -> None:
     Raises
     ------
     ValueError
-        If there is no such format, or the options are for a figure and this is a movie.
+        If there is no such format, a movie is given options of a figure, or the size is too small.
     """
     from ensemble.figures.movie import MOVIE_SUFFIXES, save_movie
 
@@ -33,4 +34,5 @@ def draw_run(run: Run, output: Path, options: FigureOptions) -> None:
             raise ValueError(f"output: a movie has no size, dpi or svg-text, got {output.name!r}")
         save_movie(run, output)
     else:
-        save(run_figure(run), output, options)
+        figure = run_figure(run) if options.size is None else fitted_run_figure(run, options.size)
+        save(figure, output, options)

@@ -2,34 +2,40 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from numpy.typing import NDArray
 
 from ensemble.figures.membranes import FEW, membrane_lines, membrane_segments, tension_scale
-from ensemble.figures.style import CLUSTER_COLORS, PALE
+from ensemble.figures.style import CLUSTER_COLORS, PALE, WIDTH
 from solver.analysis.run import Array, Frames
 from solver.scene import Scene
 
 _SPACE = 0.5  # between neighboring snapshots, in the unit of length
 
 
-def choose_snapshots(frames: Frames) -> list[int]:
+def choose_snapshots(frames: Frames, width: float = WIDTH) -> list[int]:
     """Return the indices of the frames that a figure shows: finite, evenly spread in time, with both ends.
 
     Parameters
     ----------
     frames : Frames
+    width : float
+        Of the figure, in inches.
 
     Returns
     -------
     list of int
-        At most eight, and at most three of more than `FEW` vesicles, in ascending order.
+        At most eight, and at most three of more than `FEW` vesicles, in ascending order; fewer in a narrow
+        figure.
     """
     drawable = finite_frames(frames)
     times = frames.time[drawable]
-    wanted = np.linspace(times[0], times[-1], 8 if frames.center.shape[1] <= FEW else 3)
+    most = min(8 if frames.center.shape[1] <= FEW else 3, max(2, round(8 * width / WIDTH)))
+    wanted = np.linspace(times[0], times[-1], most)
     return sorted({int(drawable[np.abs(times - time).argmin()]) for time in wanted})
 
 
@@ -48,7 +54,9 @@ def finite_frames(frames: Frames) -> NDArray[np.intp]:
     return np.flatnonzero(finite)
 
 
-def draw_snapshots(axes: Axes, scene: Scene, frames: Frames, clusters: Array | None = None) -> LineCollection:
+def draw_snapshots(
+    axes: Axes, scene: Scene, frames: Frames, chosen: Sequence[int], clusters: Array | None = None
+) -> LineCollection:
     """Draw snapshots side by side, each centered on its vesicles and labeled with its time.
 
     All snapshots share one unit of length and one color scale.  Snapshots that are much wider than high, as
@@ -60,6 +68,8 @@ def draw_snapshots(axes: Axes, scene: Scene, frames: Frames, clusters: Array | N
         Where to draw; its limits are set.
     scene : Scene
     frames : Frames
+    chosen : sequence of int
+        Indices of the frames, as `choose_snapshots` returns them.
     clusters : (frames, vesicles), optional
         Number of the cluster of each vesicle.  The vesicles of a cluster are filled with one color.
 
@@ -68,7 +78,7 @@ def draw_snapshots(axes: Axes, scene: Scene, frames: Frames, clusters: Array | N
     LineCollection
         The mappable for a color bar; its segments are ordered by snapshot, vesicle and arclength.
     """
-    chosen = choose_snapshots(frames)
+    chosen = list(chosen)
     ends, tension = membrane_segments(
         scene, frames.tangent_angle[chosen], frames.center[chosen], frames.tension[chosen]
     )

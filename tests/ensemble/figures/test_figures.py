@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import os
+import re
 import struct
 import subprocess
 import sys
@@ -14,9 +16,11 @@ import pytest
 from matplotlib.figure import Figure
 
 from ensemble.config.figure_options import FigureOptions
-from ensemble.figures import run_figure, save
+from ensemble.figures import draw_run, run_figure, save
+from ensemble.figures.fitted import fitted_run_figure
 from ensemble.figures.symbols import number_text
-from tests.ensemble.made_runs import orbit
+from solver.analysis.run import Run
+from tests.ensemble.made_runs import orbit, suspension
 
 FIRST_BYTES = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}
 
@@ -35,18 +39,54 @@ def test_equal_figures_are_equal_undated_files(tmp_path: Path, suffix: str) -> N
 
 
 def test_letters_of_an_svg_may_be_text_and_a_figure_has_the_size_that_is_asked_for(tmp_path: Path) -> None:
-    options = FigureOptions(size=(2.54 * 5, 2.54 * 4), svg_text=True)
-    save(run_figure(orbit()), tmp_path / "run.svg", options)
+    options = FigureOptions(size=(2.54 * 5, 2.54 * 8), svg_text=True)
+    draw_run(orbit(), tmp_path / "run.svg", options)
     text = (tmp_path / "run.svg").read_text()
     root = ElementTree.fromstring(text)
-    assert (root.get("width"), root.get("height")) == ("360pt", "288pt")
+    assert (root.get("width"), root.get("height")) == ("360pt", "576pt")
     words = {"".join(each.itertext()).strip() for each in root.iter("{http://www.w3.org/2000/svg}text")}
     assert "gap" in words
     save(run_figure(orbit()), tmp_path / "curves.svg")
     assert "<text" not in (tmp_path / "curves.svg").read_text()
-    save(run_figure(orbit()), tmp_path / "run.png", FigureOptions(size=(2.54 * 5, 2.54 * 4), dpi=50))
+    draw_run(orbit(), tmp_path / "run.png", FigureOptions(size=(2.54 * 5, 2.54 * 8), dpi=50))
     width, height = struct.unpack(">II", (tmp_path / "run.png").read_bytes()[16:24])
-    assert (width, height) == (250, 200)
+    assert (width, height) == (250, 400)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(
+    "run", [orbit(), orbit(flow="trap"), suspension()], ids=["shear", "trap", "clusters"]
+)
+def test_a_narrow_figure_of_a_run_has_room_for_its_letters(run: Run) -> None:
+    figure = fitted_run_figure(run, (8.6, 20.0))
+    figure.set_size_inches(8.6 / 2.54, 20 / 2.54)
+    figure.draw_without_rendering()
+    boxes = [text.get_window_extent() for text in figure.texts]
+    boxes += [axes.get_tightbbox() for axes in figure.axes]
+    assert all(figure.bbox.padded(1).containsx(x) for box in boxes for x in (box.x0, box.x1))
+    assert all(figure.bbox.padded(1).containsy(y) for box in boxes for y in (box.y0, box.y1))
+    assert not any(one.overlaps(other) for one, other in itertools.combinations(boxes, 2))
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_size_without_room_is_refused_with_one_that_suffices(tmp_path: Path) -> None:
+    path, run = tmp_path / "run.png", orbit(vesicles=1, flow=None, adhesion=False)
+    with pytest.raises(ValueError, match=r"size: 8\.6x6 is too small for this run; at a width of") as refusal:
+        draw_run(run, path, FigureOptions(size=(8.6, 6)))
+    assert not path.exists()
+    named = re.search(r"at a width of 8.6 cm it needs a height of (\d+) cm", str(refusal.value))
+    assert named is not None
+    draw_run(run, path, FigureOptions(size=(8.6, float(named[1])), dpi=30))
+    assert path.exists()
+
+
+@pytest.mark.filterwarnings("error")
+def test_no_figure_is_written_without_room_for_its_letters(tmp_path: Path) -> None:
+    figure = Figure(layout="constrained")
+    figure.add_subplot(ylabel="gap", xlabel="time", title="a\nb\nc\nd\ne\nf\ng\nh\ni")
+    with pytest.raises(ValueError, match="size: 3x3 is too small for the letters of this figure"):
+        save(figure, tmp_path / "figure.svg", FigureOptions(size=(3, 3)))
+    assert not list(tmp_path.iterdir())
 
 
 def test_numbers_in_figures_have_true_minus_signs() -> None:
@@ -102,7 +142,7 @@ def test_the_settings_of_a_user_change_no_figure(tmp_path: Path) -> None:
         "axes.unicode_minus: False\n"
     )
     code = (
-        "import sys; from pathlib import Path; from ensemble.figures import run_figure, save;"
+        "import sys; from pathlib import Path; from ensemble.figures import draw_run, run_figure, save;"
         "from tests.ensemble.made_runs import orbit; save(run_figure(orbit()), Path(sys.argv[1]))"
     )
     for name, settings in (("plain.svg", tmp_path / "none"), ("user.svg", tmp_path / "matplotlibrc")):
