@@ -15,6 +15,9 @@ from ensemble.errors import refusing
 if TYPE_CHECKING:
     from solver.scene import Scene
 
+# Beyond, an angle or a place has lost its digits.
+_LARGEST_TURN, _LARGEST_SHIFT = 1e6, 1e9
+
 
 def start_from(  # numpydoc ignore=PR01
     sources: Annotated[
@@ -68,34 +71,47 @@ def start_from(  # numpydoc ignore=PR01
     from solver.scene import Scene
 
     with refusing():
-        given = _from_files(sources, document, unit) if _are_files(sources) else None
-        scene = given or _from_run(sources, document, time, store)
-        placed = turned_and_shifted(scene, _radians(turn), shift).model_dump(mode="json", exclude_none=True)
+        angle, offset = _radians(turn), _within_reach(shift)
+        files = _are_files(sources)
+        _check_used(files, time, unit)
+        scene = _from_files(sources, document, unit) if files else _from_run(sources, document, time, store)
+        placed = turned_and_shifted(scene, angle, offset).model_dump(mode="json", exclude_none=True)
         scene = validated(Scene, override(placed, dict(map(parse_override, changes))))
-    for number, vesicle in enumerate(scene.vesicles):
-        _tell(
-            f"vesicle {number}: length {vesicle.length:.6g}, reduced area {vesicle.reduced_area:.6g}, "
-            f"center {vesicle.center[0]:.6g} {vesicle.center[1]:.6g}"
-        )
+    _tell_start(scene)
     print(tomli_w.dumps(scene.model_dump(mode="json", exclude_none=True)), end="")
 
 
 def _are_files(sources: list[str]) -> bool:
+    """Return whether all sources are files rather than a run."""
     from ensemble.config.outline_files import SUFFIXES
 
-    return any(Path(source).suffix in SUFFIXES for source in sources)
+    files = [name for name in sources if Path(name).suffix.lower() in SUFFIXES or Path(name).is_file()]
+    if files and len(files) < len(sources):
+        other = next(name for name in sources if name not in files)
+        raise ValueError(f"one run, or files of points: {files[0]!r} is a file, and {other!r} is none")
+    return bool(files)
+
+
+def _check_used(are_files: bool, time: float | None, unit: str | None) -> None:
+    """Refuse an option that would change nothing."""
+    if are_files and time is not None:
+        raise ValueError("--time — is one of a stored run, and these are files")
+    if unit is not None and not are_files:
+        raise ValueError("--unit — is that of points in files, and this is a stored run")
 
 
 def _from_files(files: list[str], document: str | None, unit: str | None) -> Scene:
-    from ensemble.config.documents import load_scene
     from ensemble.config.given_start import from_curves
     from ensemble.config.outline_files import traced_in
     from solver.dimensions import LENGTH
 
     if document is None:
         raise ValueError("--scene — say which scene gets the shapes, such as vesicle-shear")
-    scene = load_scene(document)
-    scale = 1.0 if unit is None else LENGTH.number(f"1 {unit}", scene.units)
+    scene = _scene_in(document)
+    try:
+        scale = 1.0 if unit is None else LENGTH.number(f"1 {unit}", scene.units)
+    except ValueError as error:
+        raise ValueError(f"--unit: {unit!r} — {error}") from None
     curves = [traced_in(Path(file)) for file in files]
     for file, curve in zip(files, curves, strict=True):
         _tell(f"{file}: no point is farther than {scale * curve.distance:.3g} from the curve")
@@ -103,7 +119,6 @@ def _from_files(files: list[str], document: str | None, unit: str | None) -> Sce
 
 
 def _from_run(sources: list[str], document: str | None, time: float | None, path: Path) -> Scene:
-    from ensemble.config.documents import load_scene
     from ensemble.config.given_start import from_state, nearest_frame
     from ensemble.store import Store
 
@@ -114,7 +129,7 @@ def _from_run(sources: list[str], document: str | None, time: float | None, path
     frames = run.frames
     index = nearest_frame(frames, time)
     _tell(f"the state at time {frames.time[index]:g}")
-    scene = run.scene if document is None else load_scene(document)
+    scene = run.scene if document is None else _scene_in(document)
     if len(scene.vesicles) != len(run.scene.vesicles):
         raise ValueError(
             f"--scene has {len(scene.vesicles)} vesicles, and the run has {len(run.scene.vesicles)}"
@@ -128,13 +143,55 @@ def _from_run(sources: list[str], document: str | None, time: float | None, path
     return from_state(scene, frames.tangent_angle[index], frames.center[index])
 
 
+def _scene_in(document: str) -> Scene:
+    """Read the scene that ``--scene`` names."""
+    from ensemble.config.documents import load_scene, read_document
+    from ensemble.questions import kinds
+
+    try:
+        content = read_document(document)
+        for kind in kinds():
+            if kind.marker in content and kind.kind != "scene":
+                raise ValueError(f"{document} is a {kind.kind}, and must be a scene")
+        return load_scene(document)
+    except ValueError as error:
+        raise ValueError(f"--scene: {error}") from error
+
+
 def _radians(text: str) -> float:
+    try:
+        angle = float(text)
+    except ValueError:
+        angle = _in_radians(text)
+    if not abs(angle) <= _LARGEST_TURN:
+        raise ValueError(f"--turn: {text!r} — must be from -{_LARGEST_TURN:g} to {_LARGEST_TURN:g} radians")
+    return angle
+
+
+def _in_radians(text: str) -> float:
     from solver.dimensions import ANGLE
 
     try:
-        return float(text)
-    except ValueError:
         return ANGLE.number(text, None)
+    except ValueError as error:
+        raise ValueError(f"--turn: {text!r} — {error}") from None
+
+
+def _within_reach(shift: tuple[float, float]) -> tuple[float, float]:
+    if not all(abs(each) <= _LARGEST_SHIFT for each in shift):
+        given = " ".join(f"{each:g}" for each in shift)
+        raise ValueError(f"--shift: {given} — must be from -{_LARGEST_SHIFT:g} to {_LARGEST_SHIFT:g}")
+    return shift
+
+
+def _tell_start(scene: Scene) -> None:
+    if scene.protocol is not None:
+        _tell("the protocol of the flow begins at time 0 of the new run")
+    for number, vesicle in enumerate(scene.vesicles):
+        _tell(
+            f"vesicle {number}: length {vesicle.length:.6g}, reduced area {vesicle.reduced_area:.6g}, "
+            f"center {vesicle.center[0]:.6g} {vesicle.center[1]:.6g}"
+        )
 
 
 def _tell(line: str) -> None:

@@ -24,7 +24,7 @@ from ensemble.cli.options import (
 )
 from ensemble.cli.printing import print_json, print_json_array, print_list, print_table
 from ensemble.config.defaults import DEFAULT_STORE, LISTED
-from ensemble.config.figure_options import FigureOptions, parse_size
+from ensemble.config.figure_options import USUAL, FigureOptions, parse_size
 from ensemble.config.validation import validated
 from ensemble.errors import refusing
 
@@ -118,7 +118,10 @@ def show(  # numpydoc ignore=PR01
         str | None,
         typer.Option(metavar="WxH", help="Width and height of a figure in centimeters, such as 8.6x20."),
     ] = None,
-    dpi: Annotated[int, typer.Option(help="Points of a .png on an inch, from 30 to 1200.")] = 300,
+    dpi: Annotated[
+        int | None,
+        typer.Option(help="Points of a .png on an inch, from 30 to 1200.", show_default=str(USUAL.dpi)),
+    ] = None,
     svg_text: Annotated[
         bool, typer.Option("--svg-text", help="Keep letters in an .svg as text instead of curves.")
     ] = False,
@@ -127,10 +130,12 @@ def show(  # numpydoc ignore=PR01
     as_json: AsJson = False,
 ) -> None:
     """Print a run, a boundary or a branch of steady states, or draw it to a file."""
+    drawing = {"size": size, "dpi": dpi, "svg_text": svg_text or None}
+    with refusing():
+        options = _figure_options({name: each for name, each in drawing.items() if each is not None}, output)
+        if output is not None and as_json:
+            raise ValueError("--json — nothing is printed with --output")
     with refusing(), _existing(store) as opened:
-        options = validated(
-            FigureOptions, {"size": size and parse_size(size), "dpi": dpi, "svg_text": svg_text}
-        )
         answer = _stored(opened, name)
         if units is not None:
             answer = answer.in_units(_units_of(units))
@@ -140,6 +145,15 @@ def show(  # numpydoc ignore=PR01
             print_json(answer.json_document())
         else:
             print_table(answer.table())
+
+
+def _figure_options(given: dict[str, Any], output: Path | None) -> FigureOptions:
+    if given and output is None:
+        names = " and ".join("--" + name.replace("_", "-") for name in given)
+        raise ValueError(f"{names} — needs --output, the file of a figure")
+    if "size" in given:
+        given = given | {"size": parse_size(given["size"])}
+    return validated(FigureOptions, given)
 
 
 def _stored(store: Store, name: str) -> StoredAnswer:

@@ -68,7 +68,7 @@ def test_another_state_is_another_scene(store: tuple[Path, str], tmp_path: Path)
     assert len(keys) == 2
 
 
-@pytest.mark.parametrize("suffix", [".csv", ".txt", ".npy", ".h5"])
+@pytest.mark.parametrize("suffix", [".csv", ".CSV", ".txt", ".npy", ".h5"])
 def test_a_vesicle_takes_its_shape_from_a_file(suffix: str, tmp_path: Path) -> None:
     file = tmp_path / f"bean{suffix}"
     if suffix == ".npy":
@@ -77,7 +77,7 @@ def test_a_vesicle_takes_its_shape_from_a_file(suffix: str, tmp_path: Path) -> N
         with h5py.File(file, "w") as opened:
             opened["cells/first"] = BEAN
             opened["time"] = np.arange(3)
-    elif suffix == ".csv":
+    elif suffix.lower() == ".csv":
         np.savetxt(file, BEAN, delimiter=",", header="x,y", comments="")
     else:
         np.savetxt(file, BEAN)
@@ -117,27 +117,53 @@ def test_points_in_a_unit(tmp_path: Path) -> None:
     [
         (("none.csv", "--scene=vesicle-shear"), "'none.csv' is no file"),
         (("words.csv", "--scene=vesicle-shear"), "words.csv: every line must have two numbers"),
-        (
-            ("crossing.csv", "--scene=vesicle-shear"),
-            "crossing.csv: the curve through the points crosses itself",
-        ),
         (("bean.csv",), "--scene"),
         (("bean.csv", "--scene=doublet-shear"), "2 vesicles, and there are 1 files"),
-        (("bean.csv", "--scene=vesicle-shear", "--turn=3 m"), "unit of angle"),
-        (("bean.csv", "--scene=vesicle-shear", "--unit=um"), "needs the table units"),
+        (
+            ("bean.csv", "--scene=vesicle-shear", "--turn=3 m"),
+            "--turn: '3 m' — must be a number",
+        ),
+        (("bean.csv", "--scene=vesicle-shear", "--turn=1e400"), "--turn: '1e400' — must be from"),
+        (
+            ("bean.csv", "--scene=vesicle-shear", "--shift", "0", "nan"),
+            "--shift: 0 nan — must be from",
+        ),
+        (("bean.csv", "--scene=vesicle-shear", "--unit=um"), "--unit: 'um' — a unit needs the table units"),
+        (("bean.csv", "--scene=vesicle-shear", "--time=3"), "--time — is one of a stored run"),
+        (
+            ("bean.csv", "--scene=critical-hamaker"),
+            "--scene: critical-hamaker is a study, and must be a scene",
+        ),
+        (("abc", "bean.csv", "--scene=doublet-shear"), "'bean.csv' is a file, and 'abc' is none"),
+        (("huge.csv", "--scene=vesicle-shear"), "huge.csv: points must lie within 1e+100 of the origin"),
         (("bean.csv", "bean.csv", "--scene=doublet-shear"), "vesicles 0 and 1 overlap"),
         (("bean.csv", "--scene=vesicle-shear", "--set=vesicles.reduced_area=0.5"), "reduced_area is 0.5"),
     ],
 )
 def test_bad_input_is_refused_in_a_line(arguments: tuple[str, ...], message: str, tmp_path: Path) -> None:
     np.savetxt(tmp_path / "bean.csv", BEAN, delimiter=",")
-    crossing = np.column_stack([2 * np.cos(ANGLE), np.sin(ANGLE) * (1.3 * np.cos(ANGLE) ** 2 - 0.1)])
-    np.savetxt(tmp_path / "crossing.csv", crossing, delimiter=",")
+    np.savetxt(tmp_path / "huge.csv", 1e200 * BEAN, delimiter=",")
     (tmp_path / "words.csv").write_text("x,y\n1,2,3\n")
     done = start_from(tmp_path, *arguments)
     assert done.returncode == 2
     assert done.stdout == ""
     assert message in done.stderr.splitlines()[-1]
+    assert "Warning" not in done.stderr
+
+
+def test_the_unit_of_points_is_none_of_a_run(store: tuple[Path, str]) -> None:
+    done = start_from(store[0], store[1], "--unit=um")
+    assert done.returncode == 2
+    assert "--unit — is that of points in files" in done.stderr
+
+
+def test_it_is_said_that_a_protocol_begins_anew(store: tuple[Path, str]) -> None:
+    assert "protocol" not in start_from(store[0], store[1]).stderr
+    done = start_from(
+        store[0], store[1], '--set=protocol={kind = "ramp", start = 0.0, end = 1.0, duration = 4.0}'
+    )
+    assert done.returncode == 0, done.stderr
+    assert "the protocol of the flow begins at time 0 of the new run" in done.stderr
 
 
 def test_a_time_that_the_run_does_not_have_is_refused(store: tuple[Path, str]) -> None:

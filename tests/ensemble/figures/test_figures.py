@@ -109,6 +109,23 @@ def test_other_sizes_are_refused_by_name(ensemble, finished_study, option: str, 
     assert named in refused.stderr
 
 
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        (("--size=8x6",), "--size — needs --output"),
+        (("--dpi=300", "--svg-text"), "--dpi and --svg-text — needs --output"),
+        (("--json", "--output=figure.svg"), "--json — nothing is printed with --output"),
+    ],
+)
+def test_options_that_would_change_nothing_are_refused(
+    ensemble, finished_study, options: tuple[str, ...], named: str
+) -> None:
+    refused = ensemble("show", "critical-hamaker", *options, f"--store={finished_study.store}")
+    assert refused.returncode == 2
+    assert named in refused.stderr
+    assert refused.stdout == ""
+
+
 def test_other_suffixes_are_refused_by_name(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"output: must end in \.png, \.svg or \.pdf, got 'run\.mp4'"):
         save(Figure(), tmp_path / "run.mp4")
