@@ -17,8 +17,8 @@ def traced_in(path: Path) -> TracedCurve:
     Parameters
     ----------
     path : Path
-        Two columns, x and y: of text, separated by commas, semicolons or blanks, after a heading or not; or
-        the array of a ``.npy`` file; or the only array of that shape in an HDF5 file.
+        Two columns of real numbers, x and y: of text, separated by commas, semicolons or blanks, after a
+        heading or not; or the array of a ``.npy`` file; or the only array of that shape in an HDF5 file.
 
     Returns
     -------
@@ -33,20 +33,21 @@ def traced_in(path: Path) -> TracedCurve:
 
     if not path.is_file():
         raise ValueError(f"{str(path)!r} is no file")
-    if path.suffix not in SUFFIXES:
+    if path.suffix.lower() not in SUFFIXES:
         raise ValueError(f"{path}: the name must end in one of {', '.join(SUFFIXES)}")
     try:
         return traced_curve(_points_in(path))
-    except (ValueError, OSError) as error:
+    except (ValueError, OSError, EOFError) as error:
         raise ValueError(f"{path}: {error}") from error
 
 
 def _points_in(path: Path) -> Array:
     import numpy as np
 
-    if path.suffix == ".npy":
-        return np.asarray(np.load(path, allow_pickle=False), dtype=np.float64)
-    if path.suffix in (".h5", ".hdf5"):
+    suffix = path.suffix.lower()
+    if suffix == ".npy":
+        return _real(np.load(path, allow_pickle=False))
+    if suffix in (".h5", ".hdf5"):
         return _only_points_of(path)
     lines = path.read_text(encoding="utf-8").replace(",", " ").replace(";", " ").splitlines()
     rows = [line.split() for line in lines if line.strip() and not line.startswith("#")]
@@ -59,13 +60,12 @@ def _points_in(path: Path) -> Array:
 
 def _only_points_of(path: Path) -> Array:
     import h5py
-    import numpy as np
 
     found: dict[str, Array] = {}
 
     def look(name: str, node: object) -> None:
         if isinstance(node, h5py.Dataset) and node.ndim == 2 and node.shape[1] == 2:
-            found[name] = np.asarray(node[()], dtype=np.float64)
+            found[name] = _real(node[()])
 
     with h5py.File(path) as file:
         file.visititems(look)
@@ -73,6 +73,16 @@ def _only_points_of(path: Path) -> Array:
         names = f": {', '.join(found)}" if found else ""
         raise ValueError(f"must hold one array with two columns, got {len(found)}{names}")
     return found.popitem()[1]
+
+
+def _real(values: object) -> Array:
+    """Return values as numbers, unless something would be lost or made up."""
+    import numpy as np
+
+    array = np.asarray(values)
+    if array.dtype.kind not in "iuf":
+        raise ValueError(f"must hold real numbers, got the type {array.dtype}")
+    return array.astype(np.float64)
 
 
 def _is_number(text: str) -> bool:

@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 
 FEWEST_POINTS = 8
 _FEWEST_ANGLES, _MOST_ANGLES = 32, 512
+_LARGEST = 1e100  # of which neither the square nor its inverse is out of range
+_NEAREST = 1e-12  # over the extent; nearer points have no direction from one to the next but round-off
 _FINE = 8192  # arclengths at which the spline is sampled
 _DRAWN = 1024  # points of the curve among which the nearest ones, and crossings, are looked for
 
@@ -105,7 +107,11 @@ def _counterclockwise(points: Array) -> Array:
     if len(points) < FEWEST_POINTS:
         raise ValueError(f"at least {FEWEST_POINTS} different points are needed, got {len(points)}")
     following = np.roll(points, -1, axis=0)
-    if np.any(np.all(points == following, axis=1)):
-        raise ValueError("neighboring points must differ")
+    if np.abs(points).max() > _LARGEST or np.ptp(points, axis=0).max() < 1 / _LARGEST:
+        raise ValueError(
+            f"points must lie within {_LARGEST:g} of the origin, and extend over {1 / _LARGEST:g} at least"
+        )
+    if np.hypot(*(following - points).T).min() <= _NEAREST * np.ptp(points, axis=0).max():
+        raise ValueError(f"neighboring points must differ, by {_NEAREST:g} of the extent of all at least")
     area = np.sum(points[:, 0] * following[:, 1] - points[:, 1] * following[:, 0]) / 2
     return points if area > 0 else points[::-1]

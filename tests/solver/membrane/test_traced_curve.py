@@ -63,12 +63,25 @@ def test_walls_may_be_near_but_may_not_cross() -> None:
         traced_curve(dumbbell(-0.02))
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("size", [1e-90, 1e90])
+def test_a_curve_of_any_size_has_the_same_shape(size: float) -> None:
+    np.testing.assert_allclose(
+        traced_curve(size * ellipse(40)).tangent_angle, traced_curve(ellipse(40)).tangent_angle, atol=1e-9
+    )
+
+
+@pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(
     ("points", "message"),
     [
         (ellipse(7), "at least 8 different points are needed, got 7"),
         (np.zeros((20, 3)), r"two columns, x and y, got shape \(20, 3\)"),
         (np.full((20, 2), np.nan), "finite"),
+        (1e200 * ellipse(20), r"within 1e\+100 of the origin"),
+        (3e307 * ellipse(20), r"within 1e\+100 of the origin"),
+        (1e-200 * ellipse(20), "over 1e-100 at least"),
+        (ellipse(20)[[0, *range(20)]] + 1e-14 * np.eye(21, 2), "neighboring points must differ"),
         (np.repeat(ellipse(20), 2, axis=0), "neighboring points must differ"),
         (ellipse(20)[np.arange(20) * 7 % 20], "not in order along a simple closed curve"),
     ],
