@@ -33,6 +33,8 @@ class UnfinishedRun:
     scene : Scene
     written : datetime
         When the checkpoint was written.
+    time : float or None
+        That it has reached; None while its start relaxes.
     in_progress : bool
         Whether the process that wrote it lives.
     saved : dict
@@ -49,6 +51,7 @@ class UnfinishedRun:
     checkpoint: Path
     scene: Scene
     written: datetime
+    time: float | None
     in_progress: bool
     saved: Saved
     place: Path
@@ -75,6 +78,8 @@ class UnfinishedRun:
         UnfinishedRunError
             If there is none from which the run can go on.
         """
+        from solver.simulation.run_so_far import time_so_far
+
         path = checkpoint_path(store, key)
         try:
             written = _written(path)  # before it is read, as it may be replaced at any time
@@ -85,6 +90,7 @@ class UnfinishedRun:
                 checkpoint=path,
                 scene=Scene.model_validate_json(content["scene"]),
                 written=written,
+                time=time_so_far(content["simulation"]),
                 in_progress=lives(store / STAGING / record["writer"]),
                 saved=content["simulation"],
                 place=store / CHECKPOINTS / key / record["writer"],
@@ -99,13 +105,6 @@ class UnfinishedRun:
             raise _useless(key, "another version wrote it") from error
 
     @property
-    def time(self) -> float | None:
-        """The time that it has reached; None while its start relaxes."""
-        from solver.simulation.run_so_far import time_so_far
-
-        return time_so_far(self.saved)
-
-    @property
     def status(self) -> str:
         """Whether a process goes on with it, in words."""
         return "in progress" if self.in_progress else "interrupted"
@@ -113,10 +112,9 @@ class UnfinishedRun:
     @property
     def progress(self) -> str:
         """How far it has come, in words."""
-        time = self.time
-        if time is None:
+        if self.time is None:
             return "while its start relaxes"
-        return f"at time {time:.6g} of {self.scene.horizon:g} at the latest"
+        return f"at time {self.time:.6g} of {self.scene.horizon:g} at the latest"
 
     def run(self) -> Run | None:
         """Return what has been computed and recorded.

@@ -7,6 +7,8 @@ import os
 import re
 import shutil
 from collections.abc import Callable, Iterator
+from functools import reduce
+from operator import getitem
 from pathlib import Path
 
 import numpy as np
@@ -161,14 +163,20 @@ def test_one_that_goes_on_or_ends_while_it_is_read_is_not_called_damaged(staging
     assert unfinished_run(staging.path, key) is None
 
 
-def test_one_of_an_earlier_version_is_called_so(staging: RunStaging) -> None:
+@pytest.mark.parametrize(
+    ("lacks", "writer"), [(("record",), "an earlier"), (("simulation", "loop"), "another")]
+)
+def test_one_of_another_version_is_called_so(
+    staging: RunStaging, lacks: tuple[str, ...], writer: str
+) -> None:
     key = kept_after(staging, PAIR, 5)
     path = checkpoint_path(staging.path, key)
     content = read_plain(path)
-    del content["record"]
+    *groups, name = lacks
+    del reduce(getitem, groups, content)[name]
     path.unlink()
     write_plain(path, content, {"key": key, "results_revision": RESULTS_REVISION})
-    expected = f"run {key}: its checkpoint cannot be used: an earlier version wrote it{ANEW}"
+    expected = f"run {key}: its checkpoint cannot be used: {writer} version wrote it{ANEW}"
     assert list(interrupted_runs(staging.path)) == [expected]
     with pytest.raises(UnfinishedRunError, match=re.escape(expected)):
         unfinished_run(staging.path, key)
