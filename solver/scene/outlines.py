@@ -8,14 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.scene.ellipses import semi_axes
-from solver.scene.tangent_angles import points_of
+from solver.scene.tangent_angles import points_of, reduced_area_of
 
 if TYPE_CHECKING:
+    from solver.scene.start import RandomWaves
     from solver.scene.vesicle import Vesicle
 
+Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 _POINTS = 128  # of the outline of an ellipse
+_CORRECTIONS = 6  # steps of Newton's method
 
 
 def outline(vesicle: Vesicle) -> ComplexArray:
@@ -29,14 +32,79 @@ def outline(vesicle: Vesicle) -> ComplexArray:
     -------
     (n,)
     """
-    if vesicle.tangent_angle is None:
-        major, minor = semi_axes(vesicle.reduced_area, vesicle.length)
-        angle = 2 * np.pi * np.arange(_POINTS) / _POINTS
-        offsets = major * np.cos(angle) + 1j * minor * np.sin(angle)
-    else:
-        shape = np.array(vesicle.tangent_angle)
-        offsets = points_of(shape, shape.size) * vesicle.length / (2 * np.pi)
+    if vesicle.tangent_angle is not None:
+        return outline_of(vesicle, np.array(vesicle.tangent_angle))
+    major, minor = semi_axes(vesicle.reduced_area, vesicle.length)
+    angle = 2 * np.pi * np.arange(_POINTS) / _POINTS
+    offsets = major * np.cos(angle) + 1j * minor * np.sin(angle)
     return np.asarray(complex(*vesicle.center) + np.exp(1j * vesicle.angle) * offsets)
+
+
+def outline_of(vesicle: Vesicle, tangent_angle: Array) -> ComplexArray:
+    """Return points of a membrane with given tangent angles, turned and placed as a vesicle is.
+
+    Parameters
+    ----------
+    vesicle : Vesicle
+    tangent_angle : (n,)
+
+    Returns
+    -------
+    (n,)
+    """
+    offsets = points_of(tangent_angle, tangent_angle.size) * vesicle.length / (2 * np.pi)
+    return np.asarray(complex(*vesicle.center) + np.exp(1j * vesicle.angle) * offsets)
+
+
+def deformed_angles(vesicle: Vesicle, index: int, waves: RandomWaves) -> Array:
+    """Return the tangent angles of a vesicle that random waves have deformed.
+
+    Parameters
+    ----------
+    vesicle : Vesicle
+    index : int
+        Of the vesicle.
+    waves : RandomWaves
+
+    Returns
+    -------
+    (n,)
+        Radians, at points equispaced in arclength, of the vesicle before it is turned.
+    """
+    along = 2 * np.pi * np.arange(_POINTS) / _POINTS
+    if vesicle.tangent_angle is None:
+        angles = _ellipse_angles(vesicle, along)
+    else:
+        given = np.array(vesicle.tangent_angle)
+        places = 2 * np.pi * np.arange(given.size) / given.size
+        angles = along + np.interp(along, places, given - places, period=2 * np.pi)
+    return _restored(angles + waves.change(index, _POINTS), vesicle.reduced_area)
+
+
+def _restored(angles: Array, reduced_area: float) -> Array:
+    """Return the tangent angles of the closed curve of a reduced area that differs least from a given one.
+
+    As `solver.membrane.shapes` does, which comes later, for the points of a run and to round-off.
+    """
+    for _ in range(_CORRECTIONS):
+        tangents = np.exp(1j * angles)
+        of_area = 2 * (tangents.conj() * points_of(angles, angles.size)).real
+        gradients = np.stack([of_area, -tangents.imag, tangents.real])
+        mean = tangents.mean()
+        deviations = np.array([reduced_area_of(angles)[0] - reduced_area, mean.real, mean.imag])
+        angles = angles - np.linalg.lstsq(gradients @ gradients.T / angles.size, deviations)[0] @ gradients
+    return angles
+
+
+def _ellipse_angles(vesicle: Vesicle, along: Array) -> Array:
+    """Return the tangent angles of an ellipse from its tip on, at fractions of its length over 2π."""
+    major, minor = semi_axes(vesicle.reduced_area, vesicle.length)
+    parameter = np.linspace(0, 2 * np.pi, 32 * _POINTS + 1)
+    tangents = -major * np.sin(parameter) + 1j * minor * np.cos(parameter)
+    speed = np.abs(tangents)
+    arclength = np.concatenate([[0.0], np.cumsum(speed[1:] + speed[:-1])])
+    at = np.interp(along / (2 * np.pi), arclength / arclength[-1], parameter)
+    return np.unwrap(np.angle(-major * np.sin(at) + 1j * minor * np.cos(at)))
 
 
 def outlines_overlap(first: ComplexArray, second: ComplexArray) -> bool:

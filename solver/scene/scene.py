@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Self
 
+import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from solver.dimensions import TIME, UNITS
@@ -20,9 +21,10 @@ from solver.scene.arrangement import Arrangement
 from solver.scene.criteria import Criteria
 from solver.scene.ellipses import overlapping_pair
 from solver.scene.numerics import Numerics
-from solver.scene.outlines import outline, outlines_overlap
+from solver.scene.outlines import deformed_angles, outline, outline_of, outlines_overlap
 from solver.scene.output import Output
-from solver.scene.start import Start
+from solver.scene.start import RandomWaves, Start
+from solver.scene.tangent_angles import crosses_itself
 from solver.scene.units import Units
 from solver.scene.vesicle import Vesicle
 
@@ -142,6 +144,11 @@ class Scene(Model):
                 f"start.deformation.amplitude must be at most {most:.4g} for the reduced area {roundest:g}, "
                 f"got {deformation.amplitude:g}"
             )
+        problem = _deformed_too_much(self.vesicles, deformation)
+        if problem:
+            raise ValueError(
+                f"start.deformation: {problem}; the amplitude must be below {deformation.amplitude:g}"
+            )
         return self
 
     @property
@@ -245,4 +252,21 @@ def _overlapping_pair(vesicles: tuple[Vesicle, ...]) -> tuple[int, int] | None:
             reach = (vesicles[index].length + vesicles[other].length) / 2
             if apart < reach and outlines_overlap(outlines[index], outlines[other]):
                 return min(index, other), max(index, other)
+    return None
+
+
+def _deformed_too_much(vesicles: tuple[Vesicle, ...], waves: RandomWaves) -> str | None:
+    """Say which vesicles overlap or cross themselves when waves have deformed them, None if none do."""
+    shapes = [deformed_angles(vesicle, index, waves) for index, vesicle in enumerate(vesicles)]
+    for index, shape in enumerate(shapes):
+        if crosses_itself(shape):
+            return f"vesicle {index} crosses itself with these waves"
+    outlines = [outline_of(vesicle, shape) for vesicle, shape in zip(vesicles, shapes, strict=True)]
+    centers = np.array([complex(*vesicle.center) for vesicle in vesicles])
+    reaches = np.abs(np.array(outlines) - centers[:, None]).max(axis=1)
+    for index, center in enumerate(centers[:-1]):
+        near = np.abs(centers[index + 1 :] - center) < reaches[index + 1 :] + reaches[index]
+        for other in index + 1 + np.flatnonzero(near):
+            if outlines_overlap(outlines[index], outlines[other]):
+                return f"vesicles {index} and {other} overlap with these waves"
     return None

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from typing import Annotated, Self
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from solver.dimensions import ANGLE, TIME
 from solver.model import Model, Positive
+
+Array = NDArray[np.float64]
 
 
 class RandomWaves(Model):
@@ -26,6 +30,28 @@ class RandomWaves(Model):
     amplitude: Annotated[Positive, ANGLE]
     seed: int = Field(0, ge=0, lt=2**63)
     waves: int = Field(8, ge=2, le=16)
+
+    def change(self, index: int, points: int) -> Array:
+        """Return the change of the tangent angles of a vesicle, the same whatever the number of points.
+
+        Parameters
+        ----------
+        index : int
+            Of the vesicle.
+        points : int
+
+        Returns
+        -------
+        (points,)
+            Radians.
+        """
+        random = np.random.default_rng((self.seed, index))
+        # One wave would open the curve.
+        waves = np.arange(2, self.waves + 1)
+        cosines, sines = random.standard_normal((2, waves.size))
+        alpha = waves[:, None] * (2 * np.pi * np.arange(points) / points)
+        change = cosines @ np.cos(alpha) + sines @ np.sin(alpha)
+        return np.asarray(self.amplitude * change / np.sqrt((cosines**2 + sines**2).sum() / 2))
 
 
 class Start(Model):

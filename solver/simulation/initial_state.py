@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from solver.membrane.geometry import Membranes
 from solver.membrane.resampling import resampled_angle
 from solver.membrane.shapes import closed_of_reduced_area, ellipse_tangent_angle, of_reduced_area
-from solver.membrane.spectral import equispaced_angles
 from solver.membrane.symmetry import independent_vesicles
 
 if TYPE_CHECKING:
@@ -51,18 +50,7 @@ def _shape(vesicle: Vesicle, index: int, deformation: RandomWaves | None, points
         shape = closed_of_reduced_area(given + vesicle.angle, area)
     if deformation is None:
         return shape
-    return closed_of_reduced_area(shape + _random_waves(deformation, index, points), area)
-
-
-def _random_waves(deformation: RandomWaves, index: int, points: int) -> Array:
-    """Return the change of the tangent angles of a vesicle, the same whatever the number of points."""
-    random = np.random.default_rng((deformation.seed, index))
-    # One wave would open the curve.
-    waves = np.arange(2, deformation.waves + 1)
-    cosines, sines = random.standard_normal((2, waves.size))
-    alpha = waves[:, None] * equispaced_angles(points)
-    change = cosines @ np.cos(alpha) + sines @ np.sin(alpha)
-    return np.asarray(deformation.amplitude * change / np.sqrt((cosines**2 + sines**2).sum() / 2))
+    return closed_of_reduced_area(shape + deformation.change(index, points), area)
 
 
 def rotated_state(membranes: Membranes, state: Array, tilt: float) -> Array:

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from solver.analysis.run import Outcome, Run
 from solver.membrane.geometry import Geometry, Membranes
@@ -71,6 +72,40 @@ def test_a_deformation_is_the_same_with_any_number_of_points(points: int) -> Non
     fine = finest.reshape(-1)[: 2 * 192].reshape(2, 192)[:, :: 192 // math.gcd(192, points)]
     coarse = membranes.tangent_angle(state)[:, :: points // math.gcd(192, points)]
     np.testing.assert_allclose(coarse, fine, rtol=0, atol=1e-5)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 3])
+def test_waves_that_make_vesicles_overlap_are_refused(seed: int) -> None:
+    """They are refused where the shapes in which the run would start overlap, and only there."""
+    apart = Scene(
+        horizon=1.0,
+        vesicles=(Vesicle(center=(-2.0, 0.0)), Vesicle(center=(2.0, 0.0))),
+        start=Start(deformation=RandomWaves(amplitude=0.19, seed=seed)),
+        numerics=Numerics(points=128),
+    )
+    membranes = Membranes.of_scene(apart)
+    first, second = np.swapaxes(Geometry(membranes, placed_state(apart)).points, 0, 1)
+    # They move along x until they touch: how far they are apart at each height.
+    low, high = max(first[1].min(), second[1].min()), min(first[1].max(), second[1].max())
+    heights = np.linspace(low, high, 400)[1:-1]
+    right = [first[0][np.abs(first[1] - height) < 0.05].max() for height in heights]
+    left = [second[0][np.abs(second[1] - height) < 0.05].min() for height in heights]
+    touching = float(np.min(np.array(left) - right)) / 2
+    for distance, overlap in ((2.0 - touching + 0.02, False), (2.0 - touching - 0.02, True)):
+        vesicles = [{"center": (-distance, 0.0)}, {"center": (distance, 0.0)}]
+        document = {"horizon": 1.0, "vesicles": vesicles, "start": apart.start.model_dump()}
+        if overlap:
+            with pytest.raises(ValidationError, match=r"start\.deformation: vesicles 0 and 1 overlap"):
+                Scene.model_validate(document)
+        else:
+            Scene.model_validate(document)
+
+
+def test_waves_that_make_a_vesicle_cross_itself_are_refused() -> None:
+    document = {"horizon": 1.0, "vesicles": [{"reduced_area": 0.3}]}
+    with pytest.raises(ValidationError, match=r"start\.deformation: vesicle 0 crosses itself"):
+        Scene.model_validate(document | {"start": {"deformation": {"amplitude": 0.5, "seed": 8}}})
+    Scene.model_validate(document | {"start": {"deformation": {"amplitude": 0.02}}})
 
 
 def test_seeds_make_deformations() -> None:
