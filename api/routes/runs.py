@@ -25,6 +25,10 @@ MAXIMUM_NUMBER = 1_000_000_000
 router = APIRouter(prefix="/runs", tags=["runs"])
 
 RunKey = Annotated[str, Path(pattern="^[0-9a-f]{32}$", description="Key of the run.")]
+SeriesNames = Annotated[
+    list[Annotated[str, StringConstraints(max_length=100)]],
+    Query(max_length=50, description="Names of diagnostics; without any, all are given."),
+]
 Start = Annotated[int, Query(ge=0, le=MAXIMUM_NUMBER, description="Number of the first one.")]
 Stop = Annotated[int, Query(ge=0, le=MAXIMUM_NUMBER, description="Number of the one after the last.")]
 Stride = Annotated[int, Query(ge=1, le=MAXIMUM_NUMBER, description="Step from one to the next.")]
@@ -102,10 +106,7 @@ def get_series(
     request: Request,
     reader: Reader,
     key: RunKey,
-    name: Annotated[
-        list[Annotated[str, StringConstraints(max_length=100)]],
-        Query(max_length=50, description="Names of diagnostics; without any, all are given."),
-    ] = [],  # noqa: B006
+    name: SeriesNames = [],  # noqa: B006  FastAPI copies it
     start: Start = 0,
     stop: Stop = MAXIMUM_NUMBER,
     stride: Stride = 1,

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from datetime import datetime
 from http import HTTPStatus
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
-from fastapi import APIRouter, Query, Request, Response
-from pydantic import BaseModel, StringConstraints
+from fastapi import APIRouter, Request, Response
+from pydantic import BaseModel
 
 from api.http.caching import JSON, json_response
 from api.http.problems import documented
 from api.results.run_arrays import SeriesDocument, SeriesSelection, UnfinishedSeries
-from api.routes.runs import MAXIMUM_NUMBER, RunKey, Start, Stop, Stride
+from api.routes.runs import MAXIMUM_NUMBER, RunKey, SeriesNames, Start, Stop, Stride
 from api.routes.service import Reader, Service
 from api.routes.streaming import stream
 from ensemble.errors import NotStored
@@ -86,10 +86,7 @@ def get_unfinished_series(
     request: Request,
     reader: Reader,
     key: RunKey,
-    name: Annotated[
-        list[Annotated[str, StringConstraints(max_length=100)]],
-        Query(max_length=50, description="Names of diagnostics; without any, all are given."),
-    ] = [],  # noqa: B006  FastAPI copies it
+    name: SeriesNames = [],  # noqa: B006  FastAPI copies it
     start: Start = 0,
     stop: Stop = MAXIMUM_NUMBER,
     stride: Stride = 1,
