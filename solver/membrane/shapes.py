@@ -16,8 +16,6 @@ from solver.scene.ellipses import semi_axes
 
 Array = NDArray[np.float64]
 
-_CORRECTIONS, _ROUND_OFF = 20, 1e-14  # steps of Newton's method at most, and where it ends
-
 
 def of_reduced_area(tangent_angle: Array, reduced_area: float) -> Array:
     """Return a membrane like the given one that has exactly this reduced area.
@@ -48,38 +46,6 @@ def of_reduced_area(tangent_angle: Array, reduced_area: float) -> Array:
     if np.max(np.abs(deviation)) < 1e-12:
         return tangent_angle
     return np.asarray(circle + root(excess, 0.5, 1.5, 1e-15) * deviation)
-
-
-def closed_of_reduced_area(tangent_angle: Array, reduced_area: float) -> Array:
-    """Return the closed membrane of exactly this reduced area that differs least from a given curve.
-
-    Newton's method with the least changes of the tangent angles; `solver.membrane.restoring` has their
-    gradients.
-
-    Parameters
-    ----------
-    tangent_angle : (N,)
-        Of a curve that nearly is such a membrane.
-    reduced_area : float
-        4π·area/length², in (0, 1].
-
-    Returns
-    -------
-    (N,)
-        Tangent angles; as near as Newton's method has come.
-    """
-    theta = tangent_angle
-    for _ in range(_CORRECTIONS):
-        tangents = curve.tangents(theta)
-        offsets = curve.positions(theta, np.zeros(2), 2 * np.pi)
-        area = curve.area(offsets, tangents, 2 * np.pi) / np.pi
-        deviations = np.array([area - reduced_area, *tangents.mean(axis=1)])
-        if np.abs(deviations).max() < _ROUND_OFF:
-            break
-        gradients = np.stack([2 * np.sum(tangents * offsets, axis=0), -tangents[1], tangents[0]])
-        products = gradients @ gradients.T / theta.size
-        theta = theta - np.linalg.lstsq(products, deviations)[0] @ gradients
-    return theta
 
 
 def ellipse_tangent_angle(reduced_area: float, length: float, angle: float, points: int) -> Array:

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from solver.membrane import curve
 from solver.membrane.resampling import resampled_angle
-from solver.membrane.shapes import closed_of_reduced_area
-from solver.scene.tangent_angles import crosses_itself, reduced_area_of
+from solver.scene.tangent_angles import closed_of_reduced_area, crosses_itself, reduced_area_of
 
 Array = NDArray[np.float64]
 

@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.scene.ellipses import semi_axes
-from solver.scene.tangent_angles import points_of, reduced_area_of
+from solver.scene.tangent_angles import closed_of_reduced_area, points_of
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from solver.scene.start import RandomWaves
     from solver.scene.vesicle import Vesicle
 
@@ -18,7 +20,6 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 _POINTS = 128  # of the outline of an ellipse
-_CORRECTIONS = 6  # steps of Newton's method
 
 
 def outline(vesicle: Vesicle) -> ComplexArray:
@@ -78,22 +79,7 @@ def deformed_angles(vesicle: Vesicle, index: int, waves: RandomWaves) -> Array:
         given = np.array(vesicle.tangent_angle)
         places = 2 * np.pi * np.arange(given.size) / given.size
         angles = along + np.interp(along, places, given - places, period=2 * np.pi)
-    return _restored(angles + waves.change(index, _POINTS), vesicle.reduced_area)
-
-
-def _restored(angles: Array, reduced_area: float) -> Array:
-    """Return the tangent angles of the closed curve of a reduced area that differs least from a given one.
-
-    As `solver.membrane.shapes` does, which comes later, for the points of a run and to round-off.
-    """
-    for _ in range(_CORRECTIONS):
-        tangents = np.exp(1j * angles)
-        of_area = 2 * (tangents.conj() * points_of(angles, angles.size)).real
-        gradients = np.stack([of_area, -tangents.imag, tangents.real])
-        mean = tangents.mean()
-        deviations = np.array([reduced_area_of(angles)[0] - reduced_area, mean.real, mean.imag])
-        angles = angles - np.linalg.lstsq(gradients @ gradients.T / angles.size, deviations)[0] @ gradients
-    return angles
+    return closed_of_reduced_area(angles + waves.change(index, _POINTS), vesicle.reduced_area)
 
 
 def _ellipse_angles(vesicle: Vesicle, along: Array) -> Array:
@@ -107,19 +93,31 @@ def _ellipse_angles(vesicle: Vesicle, along: Array) -> Array:
     return np.unwrap(np.angle(-major * np.sin(at) + 1j * minor * np.cos(at)))
 
 
-def outlines_overlap(first: ComplexArray, second: ComplexArray) -> bool:
-    """Return whether a point of one of two closed polygons lies within the other one.
+def overlapping_outlines(
+    vesicles: Sequence[Vesicle], outlines: Sequence[ComplexArray]
+) -> tuple[int, int] | None:
+    """Return the indices of two vesicles of which one has a point of its outline within the other one.
 
     Parameters
     ----------
-    first : (n,)
-    second : (m,)
+    vesicles : sequence of Vesicle
+    outlines : sequence of complex (n,)
+        One for each.
 
     Returns
     -------
-    bool
+    (int, int) or None
+        None if all are apart.
     """
-    return bool(_within(first, second).any() or _within(second, first).any())
+    centers = np.array([complex(*vesicle.center) for vesicle in vesicles])
+    reaches = np.array([np.abs(each - center).max() for each, center in zip(outlines, centers, strict=True)])
+    for index, center in enumerate(centers[:-1]):
+        near = np.abs(centers[index + 1 :] - center) < reaches[index + 1 :] + reaches[index]
+        for other in (index + 1 + np.flatnonzero(near)).tolist():
+            first, second = outlines[index], outlines[other]
+            if _within(first, second).any() or _within(second, first).any():
+                return index, other
+    return None
 
 
 def _within(points: ComplexArray, polygon: ComplexArray) -> NDArray[np.bool_]:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from typing import Annotated, Self
 
-import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from solver.dimensions import TIME, UNITS
@@ -21,7 +20,7 @@ from solver.scene.arrangement import Arrangement
 from solver.scene.criteria import Criteria
 from solver.scene.ellipses import overlapping_pair
 from solver.scene.numerics import Numerics
-from solver.scene.outlines import deformed_angles, outline, outline_of, outlines_overlap
+from solver.scene.outlines import deformed_angles, outline, outline_of, overlapping_outlines
 from solver.scene.output import Output
 from solver.scene.start import RandomWaves, Start
 from solver.scene.tangent_angles import crosses_itself
@@ -239,20 +238,14 @@ class Scene(Model):
 
 def _overlapping_pair(vesicles: tuple[Vesicle, ...]) -> tuple[int, int] | None:
     """Return the indices of two vesicles that overlap at the start, None if all are apart."""
-    given = [index for index, vesicle in enumerate(vesicles) if vesicle.tangent_angle is not None]
     ellipses = [index for index, vesicle in enumerate(vesicles) if vesicle.tangent_angle is None]
     among_ellipses = overlapping_pair(tuple(vesicles[index] for index in ellipses))
     if among_ellipses:
         first, second = among_ellipses
         return ellipses[first], ellipses[second]
-    outlines = [outline(vesicle) for vesicle in vesicles] if given else []
-    for index in given:
-        for other in (*ellipses, *(each for each in given if each > index)):
-            apart = math.dist(vesicles[index].center, vesicles[other].center)
-            reach = (vesicles[index].length + vesicles[other].length) / 2
-            if apart < reach and outlines_overlap(outlines[index], outlines[other]):
-                return min(index, other), max(index, other)
-    return None
+    if len(ellipses) == len(vesicles):
+        return None
+    return overlapping_outlines(vesicles, [outline(vesicle) for vesicle in vesicles])
 
 
 def _deformed_too_much(vesicles: tuple[Vesicle, ...], waves: RandomWaves) -> str | None:
@@ -261,12 +254,5 @@ def _deformed_too_much(vesicles: tuple[Vesicle, ...], waves: RandomWaves) -> str
     for index, shape in enumerate(shapes):
         if crosses_itself(shape):
             return f"vesicle {index} crosses itself with these waves"
-    outlines = [outline_of(vesicle, shape) for vesicle, shape in zip(vesicles, shapes, strict=True)]
-    centers = np.array([complex(*vesicle.center) for vesicle in vesicles])
-    reaches = np.abs(np.array(outlines) - centers[:, None]).max(axis=1)
-    for index, center in enumerate(centers[:-1]):
-        near = np.abs(centers[index + 1 :] - center) < reaches[index + 1 :] + reaches[index]
-        for other in index + 1 + np.flatnonzero(near):
-            if outlines_overlap(outlines[index], outlines[other]):
-                return f"vesicles {index} and {other} overlap with these waves"
-    return None
+    pair = overlapping_outlines(vesicles, list(map(outline_of, vesicles, shapes)))
+    return f"vesicles {pair[0]} and {pair[1]} overlap with these waves" if pair else None

@@ -1,7 +1,8 @@
 """The curve that a list of tangent angles describes: what it encloses, and whether it crosses itself.
 
 With θ at N points equispaced in arclength, of a curve of the length 2π, and exp(iθ) = Σ c_k exp(ikα), the
-points are Σ c_k/(ik) exp(ikα).  So the curve is closed if c_0 = 0, and 4π·area/length² = Σ |c_k|²/k.
+points are Σ c_k/(ik) exp(ikα).  So the curve is closed if c_0 = 0, and 4π·area/length² = Σ |c_k|²/k.  The
+mode k = N/2 has no sign and is left out, as in `solver.membrane.spectral`.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 _FEWEST_SEGMENTS = 256  # of the polygon that is searched for crossings
+_CORRECTIONS, _ROUND_OFF = 20, 1e-14  # steps of Newton's method at most, and where it ends
 
 
 def reduced_area_of(tangent_angle: Array) -> tuple[float, float]:
@@ -54,6 +56,38 @@ def points_of(tangent_angle: Array, count: int) -> ComplexArray:
     padded = np.zeros(count, dtype=np.complex128)
     padded[k.astype(np.int64)] = np.where(k == 0, 0.0, modes / np.where(k == 0, 1, 1j * k))
     return np.asarray(np.fft.ifft(padded) * count)
+
+
+def closed_of_reduced_area(tangent_angle: Array, reduced_area: float) -> Array:
+    """Return the closed membrane of exactly this reduced area that differs least from a given curve.
+
+    Newton's method with the least changes of the tangent angles; `solver.membrane.restoring` has their
+    gradients.
+
+    Parameters
+    ----------
+    tangent_angle : (N,)
+        Of a curve that nearly is such a membrane.
+    reduced_area : float
+        4π·area/length², in (0, 1].
+
+    Returns
+    -------
+    (N,)
+        Tangent angles; as near as Newton's method has come.
+    """
+    theta = tangent_angle
+    for _ in range(_CORRECTIONS):
+        tangents = np.exp(1j * theta)
+        mean = tangents.mean()
+        deviations = np.array([reduced_area_of(theta)[0] - reduced_area, mean.real, mean.imag])
+        if np.abs(deviations).max() < _ROUND_OFF:
+            break
+        of_area = 2 * (tangents.conj() * points_of(theta, theta.size)).real
+        gradients = np.stack([of_area, -tangents.imag, tangents.real])
+        products = gradients @ gradients.T / theta.size
+        theta = theta - np.linalg.lstsq(products, deviations)[0] @ gradients
+    return theta
 
 
 def crosses_itself(tangent_angle: Array) -> bool:
@@ -106,4 +140,5 @@ def modes_of(tangent_angle: Array) -> tuple[ComplexArray, Array]:
     """
     size = tangent_angle.size
     wavenumbers = np.fft.fftfreq(size, 1 / size).astype(np.float64)
+    wavenumbers[size // 2] = 0
     return np.fft.fft(np.exp(1j * tangent_angle)) / size, wavenumbers

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from solver.membrane.geometry import Membranes
 from solver.membrane.resampling import resampled_angle
-from solver.membrane.shapes import closed_of_reduced_area, ellipse_tangent_angle, of_reduced_area
+from solver.membrane.shapes import ellipse_tangent_angle, of_reduced_area
 from solver.membrane.symmetry import independent_vesicles
+from solver.scene.tangent_angles import closed_of_reduced_area
 
 if TYPE_CHECKING:
     from solver.scene import Scene, Vesicle

@@ -9,11 +9,11 @@ import pytest
 from pydantic import ValidationError
 
 from solver.membrane import curve
-from solver.membrane.shapes import closed_of_reduced_area, ellipse_tangent_angle
+from solver.membrane.shapes import ellipse_tangent_angle
 from solver.membrane.symmetry import has_images
 from solver.scene import Scene, Start, Vesicle
 from solver.scene.outlines import outline
-from solver.scene.tangent_angles import reduced_area_of
+from solver.scene.tangent_angles import closed_of_reduced_area, reduced_area_of
 
 ALONG = 2 * np.pi * np.arange(64) / 64
 BEAN = closed_of_reduced_area(ALONG + 0.7 * np.sin(2 * ALONG) + 0.3 * np.cos(3 * ALONG), 0.65)
