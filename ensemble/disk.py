@@ -90,6 +90,36 @@ def locked(path: Path) -> Iterator[None]:
 
 
 @contextmanager
+def placing(path: Path, directory: Path) -> Iterator[Path]:
+    """Yield a file to write, which is made durable and put in its place when the block ends without an error.
+
+    Parameters
+    ----------
+    path : Path
+        The place: a new file, or one that is replaced.
+    directory : Path
+        Where the file is written, on the same file system.
+
+    Yields
+    ------
+    Path
+        A file of the same name.
+
+    Raises
+    ------
+    OSError
+        If the disk does not take it; then a file that is in the place stays.
+    """
+    unfinished = directory / path.name
+    try:
+        yield unfinished
+        flush(unfinished)
+        unfinished.replace(path)
+    finally:
+        unfinished.unlink(missing_ok=True)  # its space may be what lacks
+
+
+@contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """Yield a file to write, which takes the place of ``path`` when the block ends without an error.
 

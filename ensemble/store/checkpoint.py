@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ensemble.config.run_key import run_key
-from ensemble.disk import flush
+from ensemble.disk import flush, placing
 from ensemble.errors import StoreError
 from ensemble.store.writers import STAGING, is_own_directory, is_own_name, lives
 from solver.revision import RESULTS_REVISION
@@ -79,7 +79,6 @@ class Checkpoint:
 
         path = checkpoint_path(self._store, self.key)
         path.parent.mkdir(exist_ok=True)
-        unfinished = self._own_directory() / path.name
         self.record.write()
         writer = self._own_directory().name
         content = {
@@ -87,12 +86,8 @@ class Checkpoint:
             "simulation": saved,
             "record": {"writer": writer, "counts": self.record.counts, "rows": self.record.rows},
         }
-        try:
+        with placing(path, self._own_directory()) as unfinished:
             write_plain(unfinished, content, _attributes(self.key) | {"writer": writer})
-            flush(unfinished)
-            unfinished.replace(path)
-        finally:
-            unfinished.unlink(missing_ok=True)  # its space may be what lacks
         flush(path.parent)
         sweep_blocks(self._store, self.key)
 

@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ensemble.disk import flush
+from ensemble.disk import flush, placing
 from ensemble.errors import StoreError
 from solver.analysis.record import FRAMES, Block, Sink, with_points
 from solver.analysis.run import Array
@@ -88,13 +88,8 @@ class RecordedBlocks(Sink):
 
         for part, number in places:
             path = self._made_directory() / _name(part, number)
-            unfinished = self._own_directory() / path.name
-            try:
+            with placing(path, self._own_directory()) as unfinished:
                 write_plain(unfinished, dict(self._waiting[part, number]), {})
-                flush(unfinished)
-                unfinished.replace(path)
-            finally:
-                unfinished.unlink(missing_ok=True)  # its space may be what lacks
             del self._waiting[part, number]
         if places:
             flush(self._directory)
