@@ -146,13 +146,12 @@ def _from_run(sources: list[str], document: str | None, time: float | None, path
 def _scene_in(document: str) -> Scene:
     """Read the scene that ``--scene`` names."""
     from ensemble.config.documents import load_scene, read_document
-    from ensemble.questions import kinds
+    from ensemble.questions import kind_of
 
     try:
-        content = read_document(document)
-        for kind in kinds():
-            if kind.marker in content and kind.kind != "scene":
-                raise ValueError(f"{document} is a {kind.kind}, and must be a scene")
+        kind = kind_of(read_document(document)).kind
+        if kind != "scene":
+            raise ValueError(f"{document} is a {kind}, and must be a scene")
         return load_scene(document)
     except ValueError as error:
         raise ValueError(f"--scene: {error}") from error
