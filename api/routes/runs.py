@@ -16,7 +16,7 @@ from api.results.flow_field import FlowField, flow_field
 from api.results.run_arrays import FramesDocument, FrameSelection, SeriesDocument, SeriesSelection, centers
 from api.routes.service import Reader
 from api.routes.streaming import as_file, stream, stream_file
-from ensemble.store.listing import without_reports
+from ensemble.store.filters import without_reports
 from ensemble.store.run_record import RunSummary
 
 BINARY = "application/octet-stream"

@@ -69,14 +69,15 @@ def query(  # numpydoc ignore=PR01
 ) -> None:
     """List the runs, the boundaries or the branches of steady states of a store."""
     from ensemble.questions.scene_question import SceneQuestion
-    from ensemble.store.listing import Listing, without_reports
+    from ensemble.store.filters import without_reports
+    from ensemble.store.listing import Listing
 
     is_chosen = collection == SceneQuestion.collection and not reports
-    filters = without_reports(where) if is_chosen else tuple(where)
-    # One more, to know whether there are more.
-    listing = Listing(filters, sort, limit + 1 if limit else None)
     paths = [path.strip() for column in columns for path in column.split(",")]
     with refusing(), _existing(store) as opened:
+        filters = without_reports(where) if is_chosen else tuple(where)
+        # One more, to know whether there are more.
+        listing = Listing(filters, sort, limit + 1 if limit else None)
         answers = _all_stored(opened, collection, listing, paths)
         documents = islice(answers.json_documents, limit or None)
         if as_json:

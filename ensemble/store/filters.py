@@ -217,6 +217,27 @@ def conditions(where: Sequence[str], document: JsonColumn, fields: Fields) -> li
     return [condition(text, document, fields) for text in where]
 
 
+def without_reports(where: Sequence[str]) -> tuple[str, ...]:
+    """Return filters that leave out runs made for reports, unless one of them asks for these.
+
+    Parameters
+    ----------
+    where : sequence of str
+        Filters of runs, as `condition` takes them.
+
+    Returns
+    -------
+    tuple of str
+
+    Raises
+    ------
+    StoreInputError
+        If a filter is malformed.
+    """
+    asks = any(_parts(text)[0] == "report" for text in where)
+    return tuple(where) if asks else (*where, "report=null")
+
+
 def within(values: ParameterRange, document: JsonColumn, fields: Fields) -> ColumnElement[bool]:
     """Turn a range of a number into a condition on a JSON column.
 

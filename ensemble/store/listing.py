@@ -2,30 +2,10 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 BATCH = 200  # records that are in memory at once, and the most in one query
-
-
-_OF_REPORTS = re.compile(r"\s*report\s*[=!<>]")
-
-
-def without_reports(where: Sequence[str]) -> tuple[str, ...]:
-    """Return filters that leave out runs made for reports, unless one of them asks for these.
-
-    Parameters
-    ----------
-    where : sequence of str
-        Filters of runs, as `ensemble.store.filters.condition` takes them.
-
-    Returns
-    -------
-    tuple of str
-    """
-    return tuple(where) if any(map(_OF_REPORTS.match, where)) else (*where, "report=null")
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from ensemble.store import Store
-from ensemble.store.listing import without_reports
+from ensemble.store.filters import without_reports
 from tests.ensemble.runs import shear_run, shear_scene
 
 
