@@ -23,6 +23,7 @@ from api.routes.service import Reader
 from api.routes.streaming import as_file, stream_file
 from ensemble.errors import BadInput
 from ensemble.store import Record
+from ensemble.store.run_record import RunSummary
 
 router = APIRouter(prefix="/boundaries", tags=["boundaries"])
 
@@ -101,6 +102,37 @@ async def get_boundary(request: Request, reader: Reader, key: StudyKey) -> Respo
     return cached_response(
         request, etag(record.json), REVALIDATE, lambda: json_response(fitted_boundary(record.json))
     )
+
+
+@router.get(
+    "/{key}/runs", response_model=CollectionPage[RunSummary], responses=documented(HTTPStatus.NOT_FOUND)
+)
+def list_runs_of_boundary(
+    request: Request, reader: Reader, key: StudyKey, after: After = None, limit: Limit = 100
+) -> Response:
+    """List the runs that a boundary rests on, in the order of their keys.
+
+    Parameters
+    ----------
+    request : Request
+    reader : Caller
+    key : str
+        Key of the study.
+    after : str or None
+        Key of the last run of the previous page.
+    limit : int
+        Largest number of runs.
+
+    Returns
+    -------
+    Response
+
+    Raises
+    ------
+    NotStored
+        If there is no boundary of this key.
+    """
+    return page_response(request, reader.service.store.boundary_runs_page(key, after, limit + 1), limit)
 
 
 @router.get("/{key}/at", openapi_extra=SWEPT_PARAMETER, responses=documented(HTTPStatus.NOT_FOUND))

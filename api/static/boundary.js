@@ -1,6 +1,6 @@
 /** A boundary: its phase diagram, its points, its runs, and values read from it. */
 
-import { changesOf, get } from "./api.js";
+import { changesOf, get, getAll } from "./api.js";
 import { otherChanges, phaseDiagram } from "./diagram.js";
 import { DiagramKeys } from "./diagram_keys.js";
 import { definitions, element, table } from "./dom.js";
@@ -19,6 +19,7 @@ import { describe, quantity, valueAt } from "./symbols.js";
  */
 
 const SECONDS_BETWEEN_REQUESTS = 0.5;
+const RUNS_AT_ONCE = 1000;
 const OPEN = ["searching", "confirming", "certifying"]; // more runs are needed
 const CONVERGED = "converged";
 
@@ -32,7 +33,7 @@ const CONVERGED = "converged";
  * @returns {Promise<void>} Resolved when another view is shown.
  */
 export async function followBoundary(place, key, signal, compared = null) {
-  const marks = new Marks(signal);
+  const marks = new Marks(key, signal);
   let view = null;
   for await (const boundary of changesOf(`/boundaries/${key}`, SECONDS_BETWEEN_REQUESTS, signal)) {
     const runs = await marks.of(boundary);
@@ -41,13 +42,17 @@ export async function followBoundary(place, key, signal, compared = null) {
   }
 }
 
-/** The runs of a boundary. A run never changes, so each is requested once. */
+/** The runs of a boundary. A run never changes, so they are requested only when there are new ones. */
 class Marks {
-  /** @type {Map<string, Promise<any>>} */
+  /** @type {Map<string, any>} */
   #summaries = new Map();
 
-  /** @param {AbortSignal} signal */
-  constructor(signal) {
+  /**
+   * @param {string} boundary - Its key.
+   * @param {AbortSignal} signal
+   */
+  constructor(boundary, signal) {
+    this.boundary = boundary;
     this.signal = signal;
   }
 
@@ -60,18 +65,16 @@ class Marks {
     const paths = [sweep.parameter, search.parameter];
     const symbols = paths.map((path) => quantity(path, scene).symbol);
     const keys = boundary.points.flatMap((point) => point.runs);
-    const summaries = await Promise.all(keys.map((key) => this.#summary(key)));
-    return summaries.map((run) => {
+    if (!keys.every((key) => this.#summaries.has(key))) {
+      for (const run of await getAll(`/boundaries/${this.boundary}/runs?limit=${RUNS_AT_ONCE}`, this.signal)) {
+        this.#summaries.set(run.key, run);
+      }
+    }
+    const runs = keys.flatMap((key) => this.#summaries.get(key) ?? []);
+    return runs.map((run) => {
       const [x, y] = paths.map((path) => valueAt(run.scene, path));
       return { key: run.key, outcome: run.outcome, x, y, text: textOf(run, [x, y], symbols) };
     });
-  }
-
-  /** @param {string} key */
-  #summary(key) {
-    const summary = this.#summaries.get(key) ?? get(`/runs/${key}`, this.signal);
-    this.#summaries.set(key, summary);
-    return summary;
   }
 }
 

@@ -149,6 +149,7 @@ class Worker:
             seconds = self._delay(reached) if waits else 0.0
             self._record(stop, self._jobs.give_back, reached, _SUSPENDED, seconds)
             return
+        self._launcher.end(attempt)  # its command may have been killed alone
         self._try_again_later(reached, stop, f"ended {_in_words(status)}")
 
     def _wait(self, process: Process, lease: Lease, stop: threading.Event) -> int | None:

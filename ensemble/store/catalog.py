@@ -170,6 +170,20 @@ class Catalog:
         row = RunRow
         return self._listed(listing, row.key, row.created, row.document, RUN_FIELDS, _RUN)
 
+    def runs_of(self, keys: Sequence[str]) -> Iterator[Record]:
+        """Look runs up.
+
+        Parameters
+        ----------
+        keys : sequence of str
+
+        Returns
+        -------
+        iterator of Record
+            Those that are there, in the order of the keys; see `runs`.
+        """
+        return self._found(keys, _RUN, RunRow.key)
+
     def runs_within(self, ranges: Sequence[ParameterRange]) -> Iterator[Record]:
         """Find runs whose scenes have parameters within some ranges, one for each combination of values.
 
@@ -330,7 +344,12 @@ class Catalog:
     ) -> Iterator[Record]:
         with self._engine.connect() as connection:
             found = [row[0] for row in connection.execute(keys)]
-        for begin in range(0, len(found), BATCH):
-            batch = found[begin : begin + BATCH]
+        yield from self._found(found, records, key)
+
+    def _found(
+        self, keys: Sequence[str], records: Select[str, str], key: InstrumentedAttribute[str]
+    ) -> Iterator[Record]:
+        for begin in range(0, len(keys), BATCH):
+            batch = keys[begin : begin + BATCH]
             there = {record.key: record for record in self._all(records.where(key.in_(batch)))}
             yield from (there[each] for each in batch if each in there)  # one may be gone by now

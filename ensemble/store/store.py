@@ -10,9 +10,11 @@ import json
 import logging
 import os
 import shutil
+from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, suppress
 from functools import cached_property
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
@@ -694,6 +696,30 @@ class Store(AbstractContextManager["Store"]):
         if record is None:
             raise NotStored(f"boundary: there is no boundary {study_key} in {self.path}")
         return record
+
+    def boundary_runs_page(self, study_key: str, after: str | None = None, limit: int = 100) -> list[Record]:
+        """Return a part of the runs that a boundary rests on, by ascending key, as they were recorded.
+
+        Parameters
+        ----------
+        study_key : str
+        after : str, optional
+            Key of the run before the first one of the part; left out, the part is the first.
+        limit : int
+            How many runs at most.
+
+        Returns
+        -------
+        list of Record
+
+        Raises
+        ------
+        NotStored
+            If there is no boundary of this study.
+        """
+        keys = sorted({run for point in self.boundary(study_key).points for run in point.runs})
+        following = keys if after is None else keys[bisect_right(keys, after) :]
+        return list(islice(self._catalog.runs_of(following), limit))
 
     def boundaries_page(
         self, where: Sequence[str] = (), after: str | None = None, limit: int = 100

@@ -1,10 +1,13 @@
 """Kills parts of a service under load and counts what was lost, repeated, torn or left behind.
 
     python -m tests.benchmarks.kills --kills 50 DIRECTORY
+    python -m tests.benchmarks.kills --kills 20 --launcher slurm DIRECTORY
 
 Jobs are submitted all the time, and read by two more clients.  Each victim in turn (the server, the worker,
-`mpirun`, a rank) is killed with SIGKILL at a random moment of a running job, so many times.  A server that is
-killed is started again here, a worker by its server.  The figures are printed as JSON.
+`mpirun`, a rank) is killed with SIGKILL at a random moment of a running job, so many times.  With the
+launcher `slurm` a cluster is started, and the victims are the server, the worker, the program that follows a
+job of Slurm, the job of Slurm, which is canceled, and a rank.  A server that is killed is started again
+here, a worker by its server.  The figures are printed as JSON.
 """
 
 from __future__ import annotations
@@ -19,7 +22,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from statistics import fmean
 from typing import Any
@@ -33,20 +36,29 @@ from api.jobs.job import Job, JobStatus
 from api.jobs.job_queue import Jobs
 from api.settings import Settings
 from ensemble.store import Store
+from tests import slurm
 from tests.api.processes import alive
 
 MARK = "ENSEMBLE_BENCHMARK_FAMILY"
-VICTIMS = ("server", "worker", "mpirun", "rank")
+SLURM_JOB = "slurm-job"
+VICTIMS = {
+    "mpirun": ("server", "worker", "mpirun", "rank"),
+    "slurm": ("server", "worker", "follower", SLURM_JOB, "rank"),
+}
 PATIENCE = 600.0  # a machine may be busy with other things
 READERS = 2
 AHEAD = 3  # jobs that wait
 
 
 class Service:
-    """`ensemble serve`, started again whenever it is killed."""
+    """`ensemble serve`, started again whenever it is killed, and the cluster that it uses, if any."""
 
-    def __init__(self, store: Path, port: int) -> None:
+    def __init__(self, store: Path, port: int, cluster: slurm.Cluster | None) -> None:
         self.mark = uuid4().hex
+        self._cluster = cluster
+        self._environment = os.environ | {MARK: self.mark}
+        if cluster is not None:
+            self._environment |= cluster.variables | {"ENSEMBLE_LAUNCHER": "slurm"}
         self.address = f"http://127.0.0.1:{port}"
         self._command = [
             sys.executable,
@@ -62,7 +74,7 @@ class Service:
     def start(self) -> None:
         """Start the server."""
         self.server = subprocess.Popen(
-            self._command, env=os.environ | {MARK: self.mark}, stdout=self._log, stderr=self._log
+            self._command, env=self._environment, stdout=self._log, stderr=self._log
         )
 
     def members(self) -> list[psutil.Process]:
@@ -78,6 +90,22 @@ class Service:
     def find(self, victim: str) -> psutil.Process | None:
         """The process that plays this part at the moment."""
         return next((process for process in self.members() if _plays(process, victim)), None)
+
+    def kill(self, victim: str) -> bool:
+        """Kill what plays this part at the moment; tell whether there was anything."""
+        if victim == SLURM_JOB:
+            running = self.cluster_jobs("--states=RUNNING")
+            if running and self._cluster is not None:
+                self._cluster.run("scancel", *running)
+            return bool(running)
+        found = self.find(victim)
+        if found is not None:
+            found.send_signal(signal.SIGKILL)
+        return found is not None
+
+    def cluster_jobs(self, *options: str) -> list[str]:
+        """Return the numbers of the jobs in the queue of the cluster."""
+        return [] if self._cluster is None else self._cluster.jobs(*options)
 
     def stop(self) -> None:
         """End it in order."""
@@ -95,6 +123,8 @@ def _plays(process: psutil.Process, part: str) -> bool:
         return environment.get("PMI_RANK") == "0" and "api.worker.background" in command
     if part == "mpirun":
         return process.name().startswith("mpi")
+    if part == "follower":
+        return "api.worker.watcher" not in command and "api.worker.launchers.slurm_job" in command
     words = [word for word in command if word != "-P"]
     return words[1:4] == ["-m", "ensemble", {"server": "serve", "worker": "worker"}[part]]
 
@@ -179,16 +209,14 @@ def kill_once(service: Service, jobs: Jobs, victim: str, chance: random.Random) 
         # A service in which no job ever comes to its end would show little.
         finished = _finished(jobs)
         wait_for(lambda: _finished(jobs) > finished)
-    wait_for(lambda: service.find("mpirun"))
+    wait_for(lambda: service.find("rank"))
     time.sleep(chance.uniform(0, 3.0))
-    wait_for(lambda: jobs.latest(1, status=JobStatus.RUNNING) and service.find(victim))
+    wait_for(lambda: jobs.latest(1, status=JobStatus.RUNNING) and service.find("rank"))
     (job,) = jobs.latest(1, status=JobStatus.RUNNING) or [None]
     spared = {"server"} if victim in ("server", "worker") else {"server", "worker"}
     old = [process for process in service.members() if not any(_plays(process, part) for part in spared)]
-    found = service.find(victim)
-    if job is None or found is None:
+    if job is None or not service.kill(victim):
         return {}
-    found.send_signal(signal.SIGKILL)
     took = {"gone": wait_for(lambda: not alive(old))}
     if victim == "server":
         service.server.wait()
@@ -217,26 +245,35 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("directory", type=Path)
     parser.add_argument("--kills", type=int, default=50, help="of each")
-    parser.add_argument("--victims", nargs="+", choices=VICTIMS, default=VICTIMS)
+    parser.add_argument("--launcher", choices=list(VICTIMS), default="mpirun")
+    parser.add_argument("--victims", nargs="+", choices={name for part in VICTIMS.values() for name in part})
     parser.add_argument("--seed", type=int, default=6)
     parser.add_argument("--minutes", type=float, default=600.0, help="after which fewer kills are enough")
     parser.add_argument("--port", type=int, default=8123)
     options = parser.parse_args()
     options.directory.mkdir(parents=True)
+    with slurm.running() if options.launcher == "slurm" else nullcontext() as cluster:
+        print(json.dumps(figures(options, cluster), indent=2))
+
+
+def figures(options: argparse.Namespace, cluster: slurm.Cluster | None) -> dict[str, Any]:
+    """Kill and count."""
     store = options.directory / "store"
     Store.open(store).close()
     chance = random.Random(options.seed)
-    took: dict[str, list[dict[str, float]]] = {victim: [] for victim in options.victims}
+    took: dict[str, list[dict[str, float]]] = {
+        victim: [] for victim in options.victims or VICTIMS[options.launcher]
+    }
     remade = 0
     with queue(store) as jobs:
-        service = Service(store, options.port)
+        service = Service(store, options.port, cluster)
         load = Load(service.address, jobs)
         known: dict[str, str] = {}
         deadline = time.monotonic() + 60 * options.minutes
         while any(len(kills) < options.kills for kills in took.values()) and time.monotonic() < deadline:
-            for victim in options.victims:
+            for victim, kills in took.items():
                 if kill := kill_once(service, jobs, victim, chance):
-                    took[victim].append(kill)
+                    kills.append(kill)
                 present = created(store)
                 remade += sum(present.get(key) != moment for key, moment in known.items())
                 known = present
@@ -248,7 +285,7 @@ def main() -> None:
         with Store.open(store) as opened:
             torn = opened.check()
         runs = created(store)
-    figures = {
+    return {
         "acknowledged": len(load.acknowledged),
         "reads": load.reads,
         "lost": len(set(load.acknowledged) - kept.keys()),
@@ -261,15 +298,20 @@ def main() -> None:
         "runs made again": remade,
         "torn": torn,
         "processes left": len(service.members()),
+        "jobs left on the cluster": len(service.cluster_jobs()),
         "attempts": sum(job.attempts for job in kept.values()),
-        "kills": {
-            victim: {"times": len(kills)}
-            | {f"most seconds until {what}": max(kill[what] for kill in kills) for what in kills[0]}
-            | {f"mean seconds until {what}": fmean(kill[what] for kill in kills) for what in kills[0]}
-            for victim, kills in took.items()
-        },
+        "kills": {victim: summary(kills) for victim, kills in took.items()},
     }
-    print(json.dumps(figures, indent=2))
+
+
+def summary(kills: list[dict[str, float]]) -> dict[str, float]:
+    """Summarize how long things took after the kills of one victim."""
+    seconds = {what: [kill[what] for kill in kills] for what in kills[0]} if kills else {}
+    return (
+        {"times": len(kills)}
+        | {f"most seconds until {what}": max(each) for what, each in seconds.items()}
+        | {f"mean seconds until {what}": fmean(each) for what, each in seconds.items()}
+    )
 
 
 if __name__ == "__main__":

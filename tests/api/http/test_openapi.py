@@ -56,6 +56,7 @@ def test_every_route_is_described(paths):
         ("get", "/boundaries/{key}"),
         ("get", "/boundaries/{key}/at"),
         ("get", "/boundaries/{key}/file"),
+        ("get", "/boundaries/{key}/runs"),
         ("get", "/presets"),
         ("get", "/reports"),
         ("get", "/reports/{name}"),

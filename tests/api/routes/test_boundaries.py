@@ -10,6 +10,7 @@ from ensemble.search.boundary import Boundary
 from ensemble.store import Store
 from tests.api.servers import client_of
 from tests.api.stores import SWEEP, critical, example_boundary
+from tests.ensemble.runs import shear_run, shear_scene
 
 
 @pytest.fixture(scope="module")
@@ -44,6 +45,30 @@ def test_boundaries_are_filtered_and_paged(tmp_path):
         assert listed == keys
         (third,) = client.get("/boundaries", params={"where": "name=study 3"}).json()["items"]
         assert third["study_key"] == keys[3]
+
+
+def test_the_runs_of_a_boundary_are_listed_once_each_in_pages(tmp_path):
+    runs = [shear_run(shear_scene(rate=rate)) for rate in (0.5, 0.6, 0.7, 0.8)]
+    with Store.open(tmp_path / "store") as store, client_of(store.path) as client:
+        *decisive, _ = [store.save(run) for run in runs]
+        gone = 32 * "0"  # set aside since
+        boundary = example_boundary()
+        first, second, *others = boundary.points
+        shared = [
+            first.model_copy(update={"runs": [gone, *decisive]}),
+            second.model_copy(update={"runs": decisive}),
+        ]
+        store.save_boundary(boundary.model_copy(update={"points": [*shared, *others]}))
+        address = f"/boundaries/{boundary.study_key}/runs"
+        listed, pages, query = [], 0, "?limit=1"
+        while query:
+            page = client.get(address + query).json()
+            listed += page["items"]
+            pages += 1
+            query = (page["next"] or "").removeprefix("runs")
+        assert pages == 3
+        assert [run["key"] for run in listed] == sorted(decisive)
+        assert listed[0] == client.get(f"/runs/{listed[0]['key']}").json()
 
 
 def test_a_boundary_that_has_changed_is_sent_again(tmp_path):
@@ -113,8 +138,8 @@ def test_values_that_cannot_be_read_are_refused(reading, address, query, named):
 
 
 def test_an_unknown_boundary_is_not_found(reading):
-    for address in ("/boundaries/0000000000000000", "/boundaries/0000000000000000/at?flow.rate=1"):
-        assert reading.get(address).status_code == 404
+    for part in ("", "/at?flow.rate=1", "/runs"):
+        assert reading.get(f"/boundaries/0000000000000000{part}").status_code == 404
 
 
 def test_a_boundary_without_a_converged_point_has_no_value(tmp_path):
