@@ -85,7 +85,8 @@ class Errors:
     """Errors of a run, and of its answers.  `solver/README.md`, section 13, says what they mean.
 
     The first four are the worst of the run.  The others are errors at the end and of answers, None where the
-    run has no such answer or its integrator does not propagate errors, and in old records.
+    run has no such answer or its integrator does not propagate errors, and in old records.  That of a period,
+    a viscosity or a time is None, too, where it is larger than the answer: it is one to first order.
 
     Attributes
     ----------

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from solver.analysis.answer_errors import change_of
 from solver.analysis.averages import is_at_rest, pair_inclination, revolves
 from solver.analysis.diagnostics import measures
-from solver.analysis.run import Errors, Outcome
+from solver.analysis.run import Errors, Outcome, Viscosity
 from solver.analysis.state_error import magnitude, position_error
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-def errors_of(scene: Scene, loop: TimeLoop, outcome: Outcome) -> Errors:
+def errors_of(scene: Scene, loop: TimeLoop, outcome: Outcome, viscosity: Viscosity | None) -> Errors:
     """Return the errors of a run and of its answers.
 
     Parameters
@@ -29,6 +29,8 @@ def errors_of(scene: Scene, loop: TimeLoop, outcome: Outcome) -> Errors:
     loop : TimeLoop
         After its last step.
     outcome : Outcome
+    viscosity : Viscosity or None
+        Of the run.
 
     Returns
     -------
@@ -40,10 +42,12 @@ def errors_of(scene: Scene, loop: TimeLoop, outcome: Outcome) -> Errors:
         temporal = position_error(loop.segment.membranes, loop.state, loop.error)
         of_answers["global_"] = float(np.hypot(temporal, recorder.spatial_position_error))
         of_answers["inclination_angle"] = _inclination_error(scene, loop, loop.error)
-        of_answers["viscosity"] = _viscosity_error(scene, loop, loop.error, outcome)
-        if scene.flow and scene.flow.rotates and loop.time > scene.constant_from:
-            of_answers["period"] = loop.answer_errors.period
-        of_answers["time"] = loop.answer_errors.separation
+        if viscosity is not None:
+            error = _viscosity_error(scene, loop, loop.error, outcome)
+            of_answers["viscosity"] = _unless_larger(error, viscosity.total)
+        if loop.tracker and scene.flow and scene.flow.rotates and loop.time > scene.constant_from:
+            of_answers["period"] = _unless_larger(loop.answer_errors.period, loop.tracker.period)
+        of_answers["time"] = _unless_larger(loop.answer_errors.separation, loop.time)
     return Errors(
         area=recorder.largest["area_error"],
         closure=recorder.largest["closure_error"],
@@ -51,6 +55,11 @@ def errors_of(scene: Scene, loop: TimeLoop, outcome: Outcome) -> Errors:
         spatial=recorder.spatial_error,
         **of_answers,
     )
+
+
+def _unless_larger(error: float | None, answer: float | None) -> float | None:
+    """Return an error to first order; None if it is larger than its answer, of which it says nothing then."""
+    return error if error is not None and answer is not None and error <= abs(answer) else None
 
 
 def _inclination_error(scene: Scene, loop: TimeLoop, error: Array) -> float | None:

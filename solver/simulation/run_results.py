@@ -40,6 +40,7 @@ def results_of(
     # Under a rate that changes no turn is like the one before.
     rotates = flow is not None and flow.rotates and loop.time > scene.constant_from
     period = loop.tracker.period if loop.tracker and rotates else None
+    viscosity = averages.viscosity(scene, sample, outcome, loop.tracker, loop.viscosities)
     done = loop.segment.work
     return RunResults(
         scene=scene,
@@ -52,12 +53,12 @@ def results_of(
         effective_aspect_ratio=flow.effective_aspect_ratio(period) if flow and period else None,
         inclination_angle=averages.inclination(scene, sample, loop.tracker),
         gap=sample.get("gap"),
-        viscosity=averages.viscosity(scene, sample, outcome, loop.tracker, loop.viscosities),
+        viscosity=viscosity,
         energy=Energy(
             bending=sample["bending_energy"],
             adhesion=sample.get("adhesion_energy"),
         ),
-        error=errors_of(scene, loop, outcome),
+        error=errors_of(scene, loop, outcome, viscosity),
         sensitive=loop.answer_errors.sensitive,
         work=Work(
             steps=loop.steps,

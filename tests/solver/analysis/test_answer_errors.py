@@ -54,6 +54,17 @@ def test_a_pair_that_might_come_back_is_sensitive() -> None:
     assert not run_at(1e-5, 0.35, horizon=800.0).sensitive
 
 
+def test_an_error_larger_than_its_answer_is_unknown() -> None:
+    """Just beyond the critical adhesion strength errors grow by ten orders of magnitude in a turn."""
+    run = run_at(1e-3, 0.37, horizon=800.0)
+    assert run.sensitive
+    assert run.period
+    assert run.error.global_ is not None
+    assert run.error.global_ > 10
+    assert run.error.period is None
+    assert run.error.viscosity is None
+
+
 def test_inclination_of_a_pair_in_strain() -> None:
     fields = {"horizon": 10.0} | {"flow": Extension(rate=0.05)}
     run, truth = (run_at(tolerance, 1.5, **fields) for tolerance in (1e-4, 1e-8))
