@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
+from pydantic import Field
 
 from solver.dimensions import LENGTH
 from solver.flows.imposed_flow import Array, ImposedFlow, Symbol
-from solver.model import Positive
 
 
 class Poiseuille(ImposedFlow):
@@ -27,7 +27,8 @@ class Poiseuille(ImposedFlow):
     """
 
     kind: Literal["poiseuille"] = "poiseuille"
-    half_width: Annotated[Positive, LENGTH] = 1.0
+    # Far beyond, the curvature of the profile or the velocity of the fluid has no digits left.
+    half_width: Annotated[float, Field(ge=1e-6, le=1e6), LENGTH] = 1.0
 
     title: ClassVar[str] = "Poiseuille flow"
     symbols: ClassVar[Mapping[str, Symbol]] = {

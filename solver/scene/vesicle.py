@@ -16,6 +16,10 @@ from solver.scene.tangent_angles import crosses_itself, reduced_area_of
 _ROUNDNESS = 1e-9
 # By so much the reduced area of a given shape may be another one, and its ends may lie apart over its length.
 _MISMATCH = 0.01
+# Farther from the origin the places of a vesicle's points lose the digits that make its shape.
+_FARTHEST = 1e9
+
+Coordinate = Annotated[float, Field(ge=-_FARTHEST, le=_FARTHEST), LENGTH]
 
 
 class Vesicle(Model):
@@ -45,7 +49,7 @@ class Vesicle(Model):
     length: Annotated[Positive, LENGTH] = 2 * math.pi
     bending_modulus: Annotated[Positive, BENDING_MODULUS] = 1.0
     viscosity_contrast: Positive = 1.0
-    center: tuple[Annotated[float, LENGTH], Annotated[float, LENGTH]] = (0.0, 0.0)
+    center: tuple[Coordinate, Coordinate] = (0.0, 0.0)
     angle: Annotated[float, ANGLE] = math.pi / 2
     # Left out where there is none, so that keys of scenes are what they were before there were any.
     tangent_angle: tuple[Annotated[float, ANGLE], ...] | None = Field(

@@ -68,6 +68,7 @@ def test_the_document_itself_is_valid() -> None:
         ("vesicles.0.length", -1.0),
         ("vesicles.1.bending_modulus", 0.0),
         ("vesicles.0.center", [0.0]),
+        ("vesicles.0.center", [1e308, 0.0]),
         ("vesicles.0.center", [0.0, math.nan]),
         ("vesicles.0.angle", math.inf),
         ("adhesion.hamaker", -0.1),
@@ -101,6 +102,13 @@ def test_a_bad_field_is_named(path: str, value: Any) -> None:
         path += "." + next(iter(value))
     named = [name for name in location if name != "shear"]  # the chosen kind of flow is part of the location
     assert ".".join(named).startswith(path)
+
+
+def test_a_profile_without_curvature_or_without_width_is_refused() -> None:
+    for half_width in (1e-320, 1e300):
+        flow = {"kind": "poiseuille", "rate": 1.0, "half_width": half_width}
+        with pytest.raises(ValidationError, match=r"(?s)half_width.*0\.000001|half_width.*1000000"):
+            Scene.model_validate(changed("flow", flow))
 
 
 def test_an_unknown_flow_is_named_with_the_known_ones() -> None:
