@@ -23,9 +23,11 @@ from tenacity import RetryCallState, retry, retry_if_exception, stop_before_dela
 
 from api.jobs.job import Job
 from api.jobs.submissions import Estimate, PresetDocument
-from api.results.boundary_values import BoundaryDocument, CriticalValueDocument, ReadingMethod
+from api.results.boundary_values import BoundaryDocument
 from ensemble.errors import EnsembleError
 from ensemble.questions import kind_of_model
+from ensemble.search.boundary_reading import CriticalValueDocument, ReadingMethod
+from ensemble.store.boundary_arrays import boundary_dataset
 from ensemble.store.run_record import FRAME_DIMENSIONS, RunSummary
 from solver.analysis.run import Array
 from solver.scene import Model
@@ -99,40 +101,15 @@ class TracedBoundary(BoundaryDocument):
     """A boundary in its present state."""
 
     def to_xarray(self) -> xarray.Dataset:
-        """Return the points of the boundary along the swept parameter.
+        """Return the points of the boundary over the values of the swept parameters.
 
         Returns
         -------
         Dataset
-            Critical value, bracket, outcomes and status of each point. Numbers that are not known yet are
-            NaN, outcomes empty.
+            Critical value, bracket, outcomes and status of each point, see
+            `ensemble.store.boundary_arrays.boundary_dataset`.
         """
-        from xarray import Dataset
-
-        swept = self.study["sweep"]["parameter"]
-        points = sorted(self.points, key=lambda point: point.parameters[swept])
-        sides = range(2)
-        return Dataset(
-            {
-                "critical_value": (swept, [_number(point.critical_value) for point in points]),
-                "bracket": (
-                    (swept, "side"),
-                    [[_number(point.bracket[side]) for side in sides] for point in points],
-                ),
-                "outcome": (
-                    (swept, "side"),
-                    [[point.outcomes[side] or "" for side in sides] for point in points],
-                ),
-                "status": (swept, [point.status for point in points]),
-                "certified": (swept, [point.certified for point in points]),
-            },
-            coords={swept: [point.parameters[swept] for point in points], "side": ["low", "high"]},
-            attrs={
-                "name": self.name,
-                "study_key": self.study_key,
-                "parameter": self.study["search"]["parameter"],
-            },
-        )
+        return boundary_dataset(self)
 
 
 class StoredRun:
@@ -407,7 +384,7 @@ class Client(AbstractContextManager["Client"]):
         key : str
             Key of the study.
         parameters : mapping
-            Value of the swept parameter by its dotted path, for example ``{"flow.rate": 0.6}``.
+            Values of the swept parameters by their dotted paths, for example ``{"flow.rate": 0.6}``.
         method : ReadingMethod
             Interpolate between two points, or take the nearest point.
 
@@ -526,7 +503,3 @@ def _checked(response: httpx2.Response) -> httpx2.Response:
         response.json() if is_problem else {"detail": response.reason_phrase},
         int(retry_after) if retry_after.isdecimal() else None,
     )
-
-
-def _number(value: float | None) -> float:
-    return float("nan") if value is None else value

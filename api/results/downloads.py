@@ -151,21 +151,20 @@ def boundary_table(boundary: Boundary) -> str:
     str
         A line for each point; numbers have all their digits, and what is not known is empty.
     """
-    swept, searched = (boundary.study[part]["parameter"] for part in ("sweep", "search"))
     text = StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(
         [
-            swept,
-            f"critical {searched}",
+            *boundary.swept,
+            f"critical {boundary.searched}",
             *("bracket low", "bracket high", "outcome below", "outcome above"),
             *("status", "certified", "runs"),
         ]
     )
-    for point in sorted(boundary.points, key=lambda each: each.parameters[swept]):
+    for point in sorted(boundary.points, key=boundary.place):
         writer.writerow(
             [
-                point.parameters[swept],
+                *boundary.place(point),
                 point.critical_value,
                 *point.bracket,
                 *point.outcomes,

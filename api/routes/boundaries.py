@@ -11,17 +11,12 @@ from pydantic import FiniteFloat, TypeAdapter, ValidationError
 from api.http.caching import NOT_MODIFIED, REVALIDATE, cached_response, etag, json_response
 from api.http.paging import After, CollectionPage, Limit, Where, page_response
 from api.http.problems import documented
-from api.results.boundary_values import (
-    BoundaryDocument,
-    CriticalValueDocument,
-    ReadingMethod,
-    critical_value_at,
-    fitted_boundary,
-)
+from api.results.boundary_values import BoundaryDocument, fitted_boundary
 from api.results.downloads import MEDIA_TYPES, BoundaryFile, boundary_table, file_response
 from api.routes.service import Reader
 from api.routes.streaming import as_file, stream_file
 from ensemble.errors import BadInput
+from ensemble.search.boundary_reading import CriticalValueDocument, ReadingMethod, critical_value_at
 from ensemble.store import Record
 from ensemble.store.run_record import RunSummary
 
@@ -29,13 +24,13 @@ router = APIRouter(prefix="/boundaries", tags=["boundaries"])
 
 StudyKey = Annotated[str, Path(pattern="^[0-9a-f]{16}$", description="Key of the study.")]
 NUMBER = TypeAdapter(FiniteFloat)
-# The name of this parameter is a dotted path, so it cannot be an argument of the function.
-SWEPT_PARAMETER: dict[str, Any] = {
+# The names of these parameters are dotted paths, so they cannot be arguments of the function.
+SWEPT_PARAMETERS: dict[str, Any] = {
     "parameters": [
         {
             "in": "query",
             "name": "parameters",
-            "description": "The swept parameter by its dotted path, for example flow.rate=0.6.",
+            "description": "Each swept parameter by its dotted path, for example flow.rate=0.6.",
             "required": True,
             "style": "form",
             "explode": True,
@@ -135,13 +130,13 @@ def list_runs_of_boundary(
     return page_response(request, reader.service.store.boundary_runs_page(key, after, limit + 1), limit)
 
 
-@router.get("/{key}/at", openapi_extra=SWEPT_PARAMETER, responses=documented(HTTPStatus.NOT_FOUND))
+@router.get("/{key}/at", openapi_extra=SWEPT_PARAMETERS, responses=documented(HTTPStatus.NOT_FOUND))
 def get_critical_value(
     request: Request,
     reader: Reader,
     key: StudyKey,
     method: Annotated[
-        ReadingMethod, Query(description="Interpolate between two points, or take the nearest point.")
+        ReadingMethod, Query(description="Interpolate between points, or take the nearest point.")
     ] = ReadingMethod.INTERPOLATED,
 ) -> CriticalValueDocument:
     """Read a critical value and its uncertainty from a boundary.
@@ -163,7 +158,7 @@ def get_critical_value(
     NotStored
         If there is no boundary of this key.
     BadInput
-        If the value of the swept parameter is missing, is no number or lies outside the boundary.
+        If a value of a swept parameter is missing, is no number or lies outside the boundary.
     """
     boundary = reader.service.store.boundary(key)
     parameters = {

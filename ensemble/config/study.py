@@ -1,34 +1,22 @@
-"""A study: one search for a critical value at every value of a sweep."""
+"""A study: one search for a critical value at every value of a sweep, or combination of several."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 from typing import Annotated, Any, Self
 
-from pydantic import (
-    AfterValidator,
-    Field,
-    GetCoreSchemaHandler,
-    GetJsonSchemaHandler,
-    ValidationInfo,
-    field_validator,
-    model_validator,
-)
-from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema, core_schema
+from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
 from ensemble.config.certifying_scene import certifying_scene
-from ensemble.config.dotted_paths import locations, value_at
+from ensemble.config.dotted_paths import Location
 from ensemble.config.geometric_grid import GeometricGrid
-from ensemble.config.measured import dimension_at
 from ensemble.config.overrides import LONGEST_NAME, override
+from ensemble.config.parameter_values import OneOrSeveral, ValueOf, number_locations, remember_scene
 from ensemble.config.validation import validated
 from solver.analysis.run import Outcome
-from solver.dimensions import Dimension, or_quantity
 from solver.scene import Model, Positive, Scene
 
 WITHOUT_ANSWER = (Outcome.UNDECIDED, Outcome.FAILED)
@@ -40,57 +28,23 @@ def _ascending(ends: tuple[float, float]) -> tuple[float, float]:
     return ends
 
 
-_SCENE = "scene"  # key of the validated scene in the context of a validation
-
-
-@dataclass(frozen=True)
-class _ValueOf:
-    """Metadata of a value of a parameter, which has that one's dimension.
-
-    Attributes
-    ----------
-    role : str
-        Key of the dimension in the context of a validation.
-    """
-
-    role: str
-
-    def remember(self, path: str, info: ValidationInfo) -> str:
-        """Keep the dimension of a parameter for the values that are validated after it."""
-        if info.context is not None and _SCENE in info.context:
-            info.context[self.role] = dimension_at(info.context[_SCENE], path)
-        return path
-
-    def _validate(self, value: Any, handler: Callable[[Any], Any], info: ValidationInfo) -> Any:
-        dimension: Dimension | None = (info.context or {}).get(self.role)
-        return handler(value) if dimension is None else dimension.validate(value, handler, info)
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.with_info_wrap_validator_function(self._validate, handler(source))
-
-    def __get_pydantic_json_schema__(
-        self, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> JsonSchemaValue:
-        return or_quantity(handler(schema), handler.mode)
-
-
-_SEARCHED, _SWEPT = _ValueOf("searched"), _ValueOf("swept")
+_SEARCHED, _SWEPT = ValueOf("searched"), ValueOf("swept")
 _Searched = Annotated[Positive, _SEARCHED]
 Interval = Annotated[tuple[_Searched, _Searched], AfterValidator(_ascending)]
 
 
 class Guess(Model):
-    """Where the boundary is expected at one value of the sweep: it saves runs and changes no answer.
+    """Where the boundary is expected at one place: it saves runs and changes no answer.
 
     Attributes
     ----------
-    at : float
-        Value of the swept parameter.
+    at : tuple of float
+        Value of each swept parameter; a number if there is one.
     bracket : (float, float)
         Values of the searched parameter between which the boundary is expected.
     """
 
-    at: Annotated[float, _SWEPT]
+    at: Annotated[tuple[float, ...], OneOrSeveral(), _SWEPT]
     bracket: Interval
 
 
@@ -195,16 +149,16 @@ class Sweep(Model):
 
 
 class Study(Model):
-    """A boundary between outcomes, traced from a base scene in two of its parameters.
+    """A boundary between outcomes, traced from a base scene: a critical value against other parameters.
 
     Attributes
     ----------
     name : str
         What the study and its boundary are called; at most 100 characters.
     scene : Scene
-        The scene in which both parameters are varied.
-    sweep : Sweep
-        The values at which a critical value is searched for.
+        The scene in which the parameters are varied.
+    sweep : tuple of Sweep
+        A critical value is searched for at every combination of their values; a table if there is one.
     search : Search
         That critical value.
     """
@@ -212,42 +166,52 @@ class Study(Model):
     # Without control characters: it is shown on terminals and in pages.
     name: Annotated[str, Field(min_length=1, max_length=LONGEST_NAME, pattern=r"^[^\x00-\x1f\x7f-\x9f]+$")]
     scene: Scene
-    sweep: Sweep
+    sweep: Annotated[tuple[Sweep, ...], Field(min_length=1), OneOrSeveral()]
     search: Search
 
-    @field_validator("scene")
-    @classmethod
-    def _whose_parameters_have_dimensions(cls, scene: Scene, info: ValidationInfo) -> Scene:
-        if info.context is not None:
-            info.context[_SCENE] = scene
-        return scene
+    _whose_parameters_have_dimensions = field_validator("scene")(remember_scene)
 
     @model_validator(mode="after")
     def _parameters_fit_the_scene(self) -> Self:
-        searched = self._number_locations("search.parameter", self.search.parameter)
-        swept = self._number_locations("sweep.parameter", self.sweep.parameter)
-        if searched & swept:
-            raise ValueError(
-                f"sweep.parameter: {self.sweep.parameter!r} — must differ from search.parameter "
-                f"{self.search.parameter!r}"
-            )
-        for sweep_value in self.sweep.values:
+        taken: dict[str, set[Location]] = {}
+        fields = {"search.parameter": self.search.parameter} | self._sweep_fields
+        for field, path in fields.items():
+            places = number_locations(self._scene_document, field, path)
+            for other, others in taken.items():
+                if places & others:
+                    raise ValueError(f"{field}: {path!r} — must differ from {other} {fields[other]!r}")
+            taken[field] = places
+        for guess in self.search.guesses:
+            if len(guess.at) != len(self.sweep):
+                raise ValueError(
+                    f"search.guesses: at {', '.join(f'{at:g}' for at in guess.at)} — "
+                    f"must have a value for each of the {len(self.sweep)} swept parameters"
+                )
+        for at in self.places:
             for limit in self.search.limits:
-                scene = self.scene_at(sweep_value, limit)
+                scene = self.scene_at(at, limit)
                 if self.search.certify:
                     certifying_scene(scene)
         return self
 
-    def _number_locations(self, field: str, path: str) -> set[tuple[str | int, ...]]:
-        document = self._scene_document
-        try:
-            places = set(locations(document, path))
-        except ValueError as error:
-            raise ValueError(f"{field}: {error}") from None
-        numbers = [value_at(document, location) for location in places]
-        if not numbers or not all(type(number) in (int, float) for number in numbers):
-            raise ValueError(f"{field}: {path!r} — must be the dotted path of a number in the scene")
-        return places
+    @property
+    def _sweep_fields(self) -> dict[str, str]:
+        """The swept parameters by the fields that name them."""
+        (first, *others) = self.sweep
+        if not others:
+            return {"sweep.parameter": first.parameter}
+        return {f"sweep.{index}.parameter": sweep.parameter for index, sweep in enumerate(self.sweep)}
+
+    @cached_property
+    def places(self) -> tuple[tuple[float, ...], ...]:
+        """Every combination of the swept values, that of the first parameter changing fastest."""
+        last_first = product(*(sweep.values for sweep in reversed(self.sweep)))
+        return tuple(place[::-1] for place in last_first)
+
+    @property
+    def swept(self) -> tuple[str, ...]:
+        """Dotted paths of the swept parameters."""
+        return tuple(sweep.parameter for sweep in self.sweep)
 
     @cached_property
     def _scene_document(self) -> dict[str, Any]:
@@ -260,13 +224,13 @@ class Study(Model):
         canonical = json.dumps(document, sort_keys=True, separators=(",", ":"))
         return hashlib.sha256(canonical.encode()).hexdigest()[:16]
 
-    def scene_at(self, sweep_value: float, value: float) -> Scene:
-        """Return the scene at one value of each of the two parameters.
+    def scene_at(self, at: tuple[float, ...], value: float) -> Scene:
+        """Return the scene with some values of the parameters.
 
         Parameters
         ----------
-        sweep_value : float
-            Of the swept parameter.
+        at : tuple of float
+            Of each swept parameter.
         value : float
             Of the searched parameter.
 
@@ -279,5 +243,5 @@ class Study(Model):
         ValueError
             If the scene does not allow one of them.
         """
-        changes = {self.sweep.parameter: sweep_value, self.search.parameter: value}
+        changes = dict(zip(self.swept, at, strict=True)) | {self.search.parameter: value}
         return validated(Scene, override(self._scene_document, changes))

@@ -147,13 +147,20 @@ def _subject(problem: ErrorDetails, document: Mapping[str, Any]) -> str:
 
 
 def _without_tags(location: Location, document: Mapping[str, Any]) -> Location:
-    """Drop the names of union members, which pydantic puts after values and between tables and fields."""
+    """Drop the names of union members, which pydantic puts after values and between tables and fields.
+
+    And the index of a table that stands for an array of it.
+    """
     kept: list[str | int] = []
     for part in location:
         node = value_at(document, tuple(kept))
         if isinstance(node, str | int | float):
             break
-        is_tag = isinstance(node, Mapping) and part not in node and part in node.values()
+        is_tag = (
+            isinstance(node, Mapping)
+            and part not in node
+            and (part in node.values() or isinstance(part, int))
+        )
         if not is_tag:
             kept.append(part)
     return tuple(kept)

@@ -19,7 +19,7 @@ from rich.text import Text
 
 from ensemble.display.compilation_lines import compilation_shown
 from ensemble.display.progress_line import ProgressLine
-from ensemble.display.result_tables import boundary_cells, boundary_columns, bracket_text
+from ensemble.display.result_tables import boundary_cells, boundary_columns, bracket_text, place_text
 
 if TYPE_CHECKING:
     from ensemble.mpi.dispatcher import JobProgress
@@ -219,8 +219,8 @@ def _table(snapshot: Snapshot) -> Table:
     columns = boundary_columns(points)
     table = Table(*columns, "running")
     for point in points:
-        (at,) = point.parameters.values()
-        values = sorted(task.value for task in snapshot.progress.running.values() if task.sweep_value == at)
+        at = snapshot.boundary.place(point)
+        values = sorted(task.value for task in snapshot.progress.running.values() if task.at == at)
         table.add_row(*boundary_cells(point, columns), ", ".join(f"{value:.6g}" for value in values))
     return table
 
@@ -246,14 +246,14 @@ class _ChangedPoints:
     """Says which brackets or statuses have changed, with the progress of the whole study."""
 
     def __init__(self) -> None:
-        self._shown: dict[float, str] = {}
+        self._shown: dict[tuple[float, ...], str] = {}
 
     def since_the_last(self, snapshot: Snapshot) -> list[str]:
         """Return a line for each point that has changed since the last snapshot."""
         lines = []
         for point in snapshot.boundary.points:
-            ((name, at),) = point.parameters.items()
-            line = f"{name} {at:g}: {bracket_text(point)} {point.status}"
+            at = snapshot.boundary.place(point)
+            line = f"{place_text(point.parameters)}: {bracket_text(point)} {point.status}"
             if point.runs and line != self._shown.get(at):
                 self._shown[at] = line
                 lines.append(f"{line} ({progress_text(snapshot.progress)})")

@@ -62,6 +62,22 @@ def boundary_cells(point: BoundaryPoint, columns: Sequence[str]) -> list[str]:
     return [cells[column] for column in columns]
 
 
+def place_text(parameters: Mapping[str, float]) -> str:
+    """Write the swept parameters of a point.
+
+    Parameters
+    ----------
+    parameters : mapping of str to float
+        Values by dotted path.
+
+    Returns
+    -------
+    str
+        Such as ``flow.rate 0.5, vesicles.reduced_area 0.9``.
+    """
+    return ", ".join(f"{name} {value:g}" for name, value in parameters.items())
+
+
 def bracket_text(point: BoundaryPoint) -> str:
     """Write the two ends of a bracket, with a question mark where an end is unknown.
 

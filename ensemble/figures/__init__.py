@@ -1,4 +1,4 @@
-"""Figures: the phase diagram of a study, snapshots and diagnostics of a run, and movies.
+"""Figures: the phase diagram or surface of a study, snapshots and diagnostics of a run, and movies.
 
 Figures are built from matplotlib's objects without pyplot, so they need no display and leave no state behind.
 """
@@ -7,5 +7,6 @@ from ensemble.figures.diagram import phase_diagram
 from ensemble.figures.figure_files import save
 from ensemble.figures.history import run_figure
 from ensemble.figures.run_drawing import draw_run
+from ensemble.figures.surface import surface_diagram
 
-__all__ = ["draw_run", "phase_diagram", "run_figure", "save"]
+__all__ = ["draw_run", "phase_diagram", "run_figure", "save", "surface_diagram"]

@@ -29,7 +29,7 @@ def phase_diagram(
     Parameters
     ----------
     boundary : Boundary
-        Its swept parameter is drawn along x, its searched parameter along y.
+        Its swept parameter, which is the only one, is drawn along x, its searched parameter along y.
     runs : sequence of (float, float, Outcome)
         Swept value, searched value and outcome of each run.
     width : float
@@ -41,8 +41,8 @@ def phase_diagram(
         The group ids of its artists are ``run <outcome>``, ``bracket``, ``certified bracket``,
         ``other change``, ``boundary`` and ``fit``.
     """
-    swept = boundary.study["sweep"]["parameter"]
-    searched = boundary.study["search"]["parameter"]
+    (swept,) = boundary.swept
+    searched = boundary.searched
     scene = boundary.scene
     x, y = quantity(swept, scene.flow), quantity(searched, scene.flow)
 

@@ -96,19 +96,24 @@ def run_study(
 
     def begin() -> StudyPlanner:
         kept = whole_store(store)
-        sweep, search = study.sweep, study.search
-        made = kept.parameters_within(
-            ParameterRange(sweep.parameter, min(sweep.values), max(sweep.values)),
-            ParameterRange(search.parameter, *search.limits),
+        swept = (
+            ParameterRange(sweep.parameter, min(sweep.values), max(sweep.values)) for sweep in study.sweep
         )
-        return StudyPlanner(study, kept.answer, ((at, value) for at, value in made))
+        searched = ParameterRange(study.search.parameter, *study.search.limits)
+        made = kept.parameters_within(*swept, searched)
+        return StudyPlanner(study, kept.answer, ((tuple(at), value) for *at, value in made))
 
     def publish(planner: StudyPlanner, progress: JobProgress[SearchRun]) -> None:
         boundary = planner.boundary()
         whole_store(store).save_boundary(boundary)
         on_change(Snapshot(boundary, progress))
 
-    boundary, usage = run_queue(communicator, ranks_per_run, store, begin, publish, StudyPlanner.boundary)
+    def conclude(planner: StudyPlanner) -> Boundary:
+        boundary = planner.boundary()
+        whole_store(store).save_boundary_arrays(boundary)
+        return boundary
+
+    boundary, usage = run_queue(communicator, ranks_per_run, store, begin, publish, conclude)
     return StudyResult(boundary, usage)
 
 

@@ -1,6 +1,6 @@
 """How large a document may be that a service takes: looked at before any work is done on it.
 
-Its vesicles are placed and compared with each other; those of a study at every value of its sweep.
+Its vesicles are placed and compared with each other; those of a study at every point of its boundary.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from pydantic import TypeAdapter, ValidationError
 MOST_VESICLES = 256
 MOST_VESICLES_SWEPT = 4
 MOST_SWEEP_VALUES = 64
+MOST_BOUNDARY_POINTS = 256
 
 _INTEGER = TypeAdapter(int)
 
@@ -37,6 +38,33 @@ def limit_elements(document: Any, most: int, *path: str) -> None:
     array = _at(document, path)
     if isinstance(array, list) and len(array) > most:
         raise ValueError(f"{'.'.join(path)}: {len(array)} elements — must be at most {most}")
+
+
+def limit_points(document: Any, most: int, *path: str) -> None:
+    """Refuse a study whose sweeps have too many values, or too many combinations of them.
+
+    Parameters
+    ----------
+    document : object
+        It has not been checked and may be anything.
+    most : int
+        How many combinations there may be.
+    *path : str
+        Names of the tables around the sweeps and of themselves.
+
+    Raises
+    ------
+    ValueError
+        With the number that is allowed.
+    """
+    sweeps = _at(document, path)
+    if not isinstance(sweeps, list):
+        limit_elements(document, MOST_SWEEP_VALUES, *path, "values")
+        return
+    arrays = [sweep["values"] for sweep in sweeps if isinstance(sweep, dict) and "values" in sweep]
+    count = math.prod(len(array) for array in arrays if isinstance(array, list))
+    if count > most:
+        raise ValueError(f"{'.'.join(path)}: {count} combinations of values — must be at most {most}")
 
 
 def limit_vesicles(document: Any, most: int, *path: str) -> None:

@@ -17,9 +17,9 @@ from ensemble.config.study import Study
 from ensemble.questions.cost import run_work
 from ensemble.questions.question import Answer, Question, StoredAnswer, StoredAnswers, where_kept
 from ensemble.questions.size_limits import (
-    MOST_SWEEP_VALUES,
+    MOST_BOUNDARY_POINTS,
     MOST_VESICLES_SWEPT,
-    limit_elements,
+    limit_points,
     limit_vesicles,
 )
 from solver.scene import Scene, Units
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from ensemble.store import Store
     from ensemble.store.columns import ListColumn
     from ensemble.store.listing import Listing
+    from solver.analysis.run import Outcome
 
 _ENDS = 2  # of a bracket, hence limits that are run first, and runs at finer numerics
 
@@ -71,7 +72,7 @@ class StudyQuestion(Question[Study]):
             What was sent.
         """
         limit_vesicles(document, MOST_VESICLES_SWEPT, "scene")
-        limit_elements(document, MOST_SWEEP_VALUES, "sweep", "values")
+        limit_points(document, MOST_BOUNDARY_POINTS, "sweep")
 
     @cached_property
     def key(self) -> str:
@@ -89,8 +90,8 @@ class StudyQuestion(Question[Study]):
         candidates = math.log(high / low) / math.log1p(study.search.tolerance)
         scanning = math.ceil(study.search.scan * math.log10(high / low))
         searching = scanning + math.ceil(math.log2(max(candidates, 2))) + _ENDS
-        for sweep_value in study.sweep.values:
-            scenes = [study.scene_at(sweep_value, limit) for limit in study.search.limits]
+        for at in study.places:
+            scenes = [study.scene_at(at, limit) for limit in study.search.limits]
             costliest = max(scenes, key=run_work)
             yield from ((scene, searching if scene is costliest else 0) for scene in scenes)
             yield certifying_scene(costliest), _ENDS
@@ -165,11 +166,10 @@ class StudyQuestion(Question[Study]):
             answer is not the only one.
         """
         points = json_document["boundary"]
+        from ensemble.display.result_tables import place_text
+
         remarks = [
-            f"{name} {value:g}: {remark}"
-            for point in points
-            for remark in _remarks(point)
-            for name, value in point["parameters"].items()
+            f"{place_text(point['parameters'])}: {remark}" for point in points for remark in _remarks(point)
         ]
         converged = sum(point["status"] == "converged" for point in points)
         return "; ".join((f"{converged} of {len(points)} points converged", *remarks))
@@ -315,10 +315,9 @@ class _StoredBoundary(StoredAnswer):
         return boundary_table(self.boundary)
 
     def draw(self, output: Path, options: FigureOptions) -> None:
-        """Draw the phase diagram, with every run that is behind the boundary."""
-        from ensemble.config.dotted_paths import parameter_value
+        """Draw the phase diagram, with every run that is behind the boundary, or the surface."""
         from ensemble.config.figure_options import INCH
-        from ensemble.figures import phase_diagram, save
+        from ensemble.figures import phase_diagram, save, surface_diagram
         from ensemble.figures.movie import MOVIE_SUFFIXES
         from ensemble.figures.style import WIDTH
 
@@ -326,12 +325,22 @@ class _StoredBoundary(StoredAnswer):
             raise ValueError(
                 f"output: only a run can be a movie, {self.boundary.name} is a boundary, got {output.name!r}"
             )
-        searched = self.boundary.study["search"]["parameter"]
+        width = WIDTH if options.size is None else options.size[0] / INCH
+        if len(self.boundary.swept) > 1:
+            figure = surface_diagram(self.boundary, width)
+        else:
+            figure = phase_diagram(self.boundary, self._runs(), width)
+        save(figure, output, options)
+
+    def _runs(self) -> list[tuple[float, float, Outcome]]:
+        """Return the swept value, the searched value and the outcome of every run behind the boundary."""
+        from ensemble.config.dotted_paths import parameter_value
+
         runs = []
         for point in self.boundary.points:
-            (at,) = point.parameters.values()
+            (at,) = self.boundary.place(point)
             for key in point.runs:
                 summary = self.store.summary(key)
-                runs.append((at, parameter_value(summary.scene, searched), summary.outcome))
-        width = WIDTH if options.size is None else options.size[0] / INCH
-        save(phase_diagram(self.boundary, runs, width), output, options)
+                value = parameter_value(summary.scene, self.boundary.searched)
+                runs.append((at, value, summary.outcome))
+        return runs

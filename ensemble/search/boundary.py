@@ -7,6 +7,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from ensemble.config.dotted_paths import is_array
 from ensemble.config.measured import Measured, dimension_at, measured_document, measured_values
 from ensemble.timestamp import Timestamp
 from solver.dimensions import Dimension
@@ -80,12 +81,12 @@ class Scanned(BaseModel):
 
 
 class BoundaryPoint(BaseModel):
-    """The bracket of the critical value at one value of the swept parameter.
+    """The bracket of the critical value at one value of each swept parameter.
 
     Attributes
     ----------
     parameters : dict
-        The swept parameter by its dotted path.
+        Values of the swept parameters by their dotted paths.
     bracket : (float or None, float or None)
         Between which values the critical value lies; None for an end that is unknown.
     critical_value : float or None
@@ -152,7 +153,7 @@ class Boundary(BaseModel):
     name : str
         Of the study.
     points : list of BoundaryPoint
-        One for each value of the sweep.
+        One for each value of the sweep, or combination of the values of several.
     updated : datetime
         When it was known so far.
     """
@@ -166,9 +167,33 @@ class Boundary(BaseModel):
     updated: Timestamp
 
     @property
+    def swept(self) -> tuple[str, ...]:
+        """Dotted paths of the swept parameters."""
+        sweep = self.study["sweep"]
+        return tuple(each["parameter"] for each in (sweep if is_array(sweep) else [sweep]))
+
+    @property
+    def searched(self) -> str:
+        """Dotted path of the parameter whose critical value is searched for."""
+        return str(self.study["search"]["parameter"])
+
+    @property
     def scene(self) -> Scene:
-        """The scene in which both parameters are varied."""
+        """The scene in which the parameters are varied."""
         return Scene.model_validate(self.study["scene"])
+
+    def place(self, point: BoundaryPoint) -> tuple[float, ...]:
+        """Return the values of the swept parameters at a point, in their order.
+
+        Parameters
+        ----------
+        point : BoundaryPoint
+
+        Returns
+        -------
+        tuple of float
+        """
+        return tuple(point.parameters[parameter] for parameter in self.swept)
 
     def in_units(self, units: Units | None) -> Self:
         """Return the boundary as if its scene had other units, or none.
@@ -195,7 +220,7 @@ class Boundary(BaseModel):
         scene = self.scene
         if scene.units is None:
             return [{} for _ in self.points]
-        searched = dimension_at(scene, self.study["search"]["parameter"])
+        searched = dimension_at(scene, self.searched)
         measured = []
         for point in self.points:
             values: dict[str, tuple[Any, Dimension | None]] = {

@@ -39,10 +39,12 @@ def line_through(boundary: Boundary) -> Line | None:
     Returns
     -------
     Line or None
-        None if fewer than three points have converged, or one of them lies off the line by more than 2 % of
-        the difference between the largest and the smallest critical value.
+        None if several parameters are swept, fewer than three points have converged, or one of them lies off
+        the line by more than 2 % of the difference between the largest and the smallest critical value.
     """
-    swept = boundary.study["sweep"]["parameter"]
+    if len(boundary.swept) > 1:
+        return None
+    (swept,) = boundary.swept
     points = [
         (point.parameters[swept], point.critical_value)
         for point in boundary.points

@@ -1,4 +1,4 @@
-"""The search, or the certification, at one value of a sweep, with its answers and its tasks."""
+"""The search, or the certification, at one place of a boundary, with its answers and its tasks."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ class SearchRun(Task):
 
     Attributes
     ----------
-    sweep_value : float
-        Of the swept parameter.
+    at : tuple of float
+        Value of each swept parameter.
     value : float
         Of the searched parameter.
     """
 
-    sweep_value: float
+    at: tuple[float, ...]
     value: float
 
 
@@ -79,8 +79,8 @@ class PointSearch(Generic[SomeValueSearch]):
     ----------
     search : ValueSearch
         What asks for values.
-    sweep_value : float
-        Where it searches.
+    at : tuple of float
+        Where it searches: the value of each swept parameter.
     scene_at : callable
         Returns the scene of a value.
     side : callable
@@ -93,13 +93,13 @@ class PointSearch(Generic[SomeValueSearch]):
     def __init__(
         self,
         search: SomeValueSearch,
-        sweep_value: float,
+        at: tuple[float, ...],
         scene_at: Callable[[float], Scene],
         side: Callable[[Outcome], Side],
         known: Callable[[str], RunAnswer | None],
     ) -> None:
         self.search = search
-        self.sweep_value = sweep_value
+        self.at = at
         self._scene_at = scene_at
         self._side = side
         self._known = known
@@ -224,7 +224,7 @@ class PointSearch(Generic[SomeValueSearch]):
 
     def _task(self, value: float) -> SearchRun:
         scene = self._scene_at(value)
-        return SearchRun(sweep_value=self.sweep_value, value=value, scene=scene, key=run_key(scene))
+        return SearchRun(at=self.at, value=value, scene=scene, key=run_key(scene))
 
     def _take_known(self, task: SearchRun) -> bool:
         answer = self._known(task.key)

@@ -6,19 +6,18 @@ the logarithm of the number of points.
 
 from __future__ import annotations
 
-from bisect import bisect_left, insort
 from collections.abc import Callable, Iterable
 from heapq import heappop, heappush
 
 from ensemble.config.study import Study
 from ensemble.search.boundary import Boundary, BoundaryPoint
+from ensemble.search.known_brackets import KnownBrackets, expected_bracket
 from ensemble.search.point_search import SearchRun
 from ensemble.search.study_point import StudyPoint
-from ensemble.search.study_search import expected_bracket
 from ensemble.search.task_queue import RunAnswer
 from ensemble.timestamp import now
 
-_NEIGHBORS = 2  # on either side, from which a bracket is expected
+Place = tuple[float, ...]  # the value of each swept parameter
 
 
 class StudyPlanner:
@@ -36,8 +35,8 @@ class StudyPlanner:
     known : callable
         Returns the answer of the run with a key if it has been made before, else None.  A run that has been
         made before is never a task.
-    made : iterable of (float, float)
-        Values of the two parameters, of the sweep and of the search, at which runs have been made before.
+    made : iterable of (tuple of float, float)
+        Values of the swept parameters and of the searched one at which runs have been made before.
         Those runs that belong to this study are answers from the start.
     """
 
@@ -45,23 +44,22 @@ class StudyPlanner:
         self,
         study: Study,
         known: Callable[[str], RunAnswer | None],
-        made: Iterable[tuple[float, float]] = (),
+        made: Iterable[tuple[Place, float]] = (),
     ) -> None:
         self._study = study
         self._grid = study.search.grid
         self._indices = self._grid.within(*study.search.limits)
-        self._points = {at: StudyPoint(study, at, known) for at in study.sweep.values}
+        self._points = {at: StudyPoint(study, at, known) for at in study.places}
         for at, value in {place for place in made if self._is_tried(*place)}:
             self._points[at].take_known(value)
         self._order = {at: order for order, at in enumerate(self._points)}
         # Entries of the queue whose number is no longer that of their point are out of date.
-        self._queue: list[tuple[tuple[bool, bool, int], int, int, float]] = []
+        self._queue: list[tuple[tuple[bool, bool, int], int, int, Place]] = []
         self._entries = dict.fromkeys(self._points, 0)
-        self._open: set[float] = set()
-        self._unneeded: dict[float, tuple[SearchRun, ...]] = {}
-        self._documents: dict[float, BoundaryPoint] = {}
-        self._converged: dict[float, tuple[float, float]] = {}
-        self._converged_at: list[float] = []  # ascending
+        self._open: set[Place] = set()
+        self._unneeded: dict[Place, tuple[SearchRun, ...]] = {}
+        self._documents: dict[Place, BoundaryPoint] = {}
+        self._converged = KnownBrackets()
         for at in self._points:
             self._look_at(at)
 
@@ -72,7 +70,7 @@ class StudyPlanner:
             if entry != self._entries[at]:
                 continue
             point = self._points[at]
-            if point.is_new and (guess := self._expected_bracket(at)) is not None:
+            if point.is_new and (guess := expected_bracket(self._study, at, self._converged.near(at))):
                 point.replace_guess(guess)
             task = point.next_task()
             # A point without a task has none until it gets another answer.
@@ -91,8 +89,8 @@ class StudyPlanner:
         answer : RunAnswer
             Of its run.
         """
-        self._points[task.sweep_value].answer(task, answer)
-        self._look_at(task.sweep_value)
+        self._points[task.at].answer(task, answer)
+        self._look_at(task.at)
 
     def cancelled(self, task: SearchRun) -> None:
         """See `TaskQueue`.
@@ -102,8 +100,8 @@ class StudyPlanner:
         task : SearchRun
             A task that is handed out.
         """
-        self._points[task.sweep_value].cancelled(task)
-        self._look_at(task.sweep_value)
+        self._points[task.at].cancelled(task)
+        self._look_at(task.at)
 
     def unneeded_tasks(self) -> tuple[SearchRun, ...]:
         """See `TaskQueue`."""
@@ -136,13 +134,13 @@ class StudyPlanner:
             updated=now(),
         )
 
-    def _is_tried(self, at: float, value: float) -> bool:
+    def _is_tried(self, at: Place, value: float) -> bool:
         try:
             return at in self._points and self._grid.index(value) in self._indices
         except ValueError:  # not on the grid
             return False
 
-    def _look_at(self, at: float, again: bool = True) -> None:
+    def _look_at(self, at: Place, again: bool = True) -> None:
         """Take note of what has become of a point, and enter it in the queue again."""
         point = self._points[at]
         self._documents.pop(at, None)
@@ -151,22 +149,7 @@ class StudyPlanner:
             self._unneeded[at] = unneeded
         else:
             self._unneeded.pop(at, None)
-        self._note_bracket(at)
+        self._converged.note(at, point.converged_bracket)
         self._entries[at] += 1
         if again and at in self._open:
             heappush(self._queue, (point.urgency, self._order[at], self._entries[at], at))
-
-    def _note_bracket(self, at: float) -> None:
-        bracket = self._points[at].converged_bracket
-        if bracket is None:
-            if self._converged.pop(at, None) is not None:
-                self._converged_at.remove(at)
-        else:
-            if at not in self._converged:
-                insort(self._converged_at, at)
-            self._converged[at] = bracket
-
-    def _expected_bracket(self, at: float) -> tuple[float, float] | None:
-        place = bisect_left(self._converged_at, at)
-        neighbors = self._converged_at[max(0, place - _NEIGHBORS) : place + _NEIGHBORS]
-        return expected_bracket(self._study, at, {near: self._converged[near] for near in neighbors})

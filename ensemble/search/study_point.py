@@ -23,7 +23,7 @@ ENDS = 2  # of a bracket, hence runs of a certification that finds both where th
 
 
 class StudyPoint:
-    """The search at one value of a sweep, with the confirmation and the certification of its bracket.
+    """The search at one place, with the confirmation and the certification of its bracket.
 
     When the search is done, the ends of brackets whose runs are sensitive are run again at finer numerics.
     When all of them are known, those that came out otherwise replace the former answers, and the search goes
@@ -33,21 +33,21 @@ class StudyPoint:
     ----------
     study : Study
         What is to be traced.
-    sweep_value : float
-        Of the swept parameter.
+    at : tuple of float
+        Value of each swept parameter.
     known : callable
         Returns the answer of the run with a key if it has been made before, else None.  A run that has been
         made before is never a task.
     """
 
-    def __init__(self, study: Study, sweep_value: float, known: Callable[[str], RunAnswer | None]) -> None:
+    def __init__(self, study: Study, at: tuple[float, ...], known: Callable[[str], RunAnswer | None]) -> None:
         self._study = study
-        self._sweep_value = sweep_value
+        self._at = at
         self._known = known
         self._search: PointSearch[BracketSearch] = PointSearch(
             critical_value_search(study),
-            sweep_value,
-            partial(study.scene_at, sweep_value),
+            at,
+            partial(study.scene_at, at),
             partial(side_of, study),
             known,
         )
@@ -179,9 +179,9 @@ class StudyPoint:
             if ends is not None:
                 bracket, outcomes = ends, certification.outcomes(ends)
                 if result is CertificationResult.CONVERGED:
-                    certified_by = certifying_scene(self._study.scene_at(self._sweep_value, ends[0])).numerics
+                    certified_by = certifying_scene(self._study.scene_at(self._at, ends[0])).numerics
         return BoundaryPoint(
-            parameters={self._study.sweep.parameter: self._sweep_value},
+            parameters=dict(zip(self._study.swept, self._at, strict=True)),
             bracket=bracket,
             outcomes=outcomes,
             status=status,
@@ -249,11 +249,11 @@ class StudyPoint:
         return True
 
     def _finer_scene(self, value: float) -> Scene:
-        return certifying_scene(self._study.scene_at(self._sweep_value, value))
+        return certifying_scene(self._study.scene_at(self._at, value))
 
     def _at_finer_numerics(self, search: SomeValueSearch) -> PointSearch[SomeValueSearch]:
         side = partial(side_of, self._study)
-        return PointSearch(search, self._sweep_value, self._finer_scene, side, self._known)
+        return PointSearch(search, self._at, self._finer_scene, side, self._known)
 
     def _change(self, ends: tuple[float, float]) -> OutcomeChange:
         return OutcomeChange.model_validate({"bracket": ends, "outcomes": self._outcomes(ends)})

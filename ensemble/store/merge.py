@@ -56,6 +56,7 @@ def _merge_boundaries(source: Store, target: Store) -> int:
         other = there.get(boundary.study_key)
         if other is None or other.updated < boundary.updated:
             target.save_boundary(boundary)
+            target.save_boundary_arrays(boundary)
             copied += 1
     return copied
 

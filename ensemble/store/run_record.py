@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from ensemble.config.measured import dimension_at
 from ensemble.config.run_key import DISTRIBUTION, run_key
 from ensemble.timestamp import Timestamp, now
 from solver.analysis.recorded import RECORDED
@@ -27,7 +28,7 @@ from solver.analysis.run import (
     Viscosity,
     Work,
 )
-from solver.dimensions import LENGTH, TIME
+from solver.dimensions import LENGTH, TIME, Dimension
 from solver.revision import RESULTS_REVISION
 from solver.scene import Scene, Units
 
@@ -257,10 +258,32 @@ def _attributes(name: str, units: Units | None) -> dict[str, Any]:
     if recorded is None:
         return {}
     description, dimension = recorded
-    attributes = {"long_name": description, "units": dimension.symbol}
+    return {"long_name": description} | _units(dimension, units)
+
+
+def _units(dimension: Dimension, units: Units | None) -> dict[str, Any]:
     if units is None or dimension.is_pure:
-        return attributes
-    return attributes | {"si_units": dimension.si, "si_factor": units.scale(dimension)}
+        return {"units": dimension.symbol}
+    return {"units": dimension.symbol, "si_units": dimension.si, "si_factor": units.scale(dimension)}
+
+
+def parameter_attributes(scene: Scene, path: str) -> dict[str, Any]:
+    """Return the attributes of an array of values of a parameter: its units, if it has any.
+
+    Parameters
+    ----------
+    scene : Scene
+        That has the parameter.
+    path : str
+        Its dotted path.
+
+    Returns
+    -------
+    dict
+        JSON data.
+    """
+    dimension = dimension_at(scene, path)
+    return {} if dimension is None else _units(dimension, scene.units)
 
 
 def rebuild(summary: RunSummary, read: Callable[[str], Array]) -> Run:

@@ -11,7 +11,7 @@ import logging
 import os
 import shutil
 from bisect import bisect_right
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, suppress
 from functools import cached_property
 from itertools import islice
@@ -39,14 +39,20 @@ from ensemble.store.writers import STAGING
 from solver.analysis.run import Outcome, Run
 
 if TYPE_CHECKING:
+    from pydantic import BaseModel
+
     from ensemble.search.branch_summary import BranchSummary
     from ensemble.store.archive import StoredArrays
     from ensemble.store.branch_shelf import BranchShelf
+    from ensemble.store.grid_shelf import GridShelf
     from ensemble.store.recorded_blocks import RecordedBlocks
+    from ensemble.store.run_record import NamedArray
     from ensemble.store.verification import OnProgress
     from solver.analysis.run import RunResults
     from solver.scene import Scene
     from solver.simulation.steady_scenes import SteadyBranch
+
+BOUNDARIES = "boundaries"
 
 _CANDIDATES = 5  # keys that a message about an ambiguous one names
 
@@ -779,6 +785,41 @@ class Store(AbstractContextManager["Store"]):
 
         return BranchShelf(self.path)
 
+    @cached_property
+    def boundary_grids(self) -> GridShelf:
+        """The boundaries that are traced, as arrays."""
+        from ensemble.store.grid_shelf import GridShelf
+
+        return GridShelf(self.path, BOUNDARIES, "boundary")
+
+    def save_boundary_arrays(self, boundary: Boundary) -> None:
+        """Keep a boundary that is traced as arrays, too, instead of those of the same study.
+
+        Parameters
+        ----------
+        boundary : Boundary
+
+        Raises
+        ------
+        StoreError
+            If they could not be written.
+        """
+        from ensemble.store.boundary_arrays import boundary_arrays
+
+        self._save_grid(self.boundary_grids, boundary.study_key, boundary, boundary_arrays(boundary))
+
+    def _save_grid(
+        self, shelf: GridShelf, key: str, answer: BaseModel, arrays: Mapping[str, NamedArray]
+    ) -> None:
+        attributes = answer.model_dump(mode="json")
+        try:
+            patiently(OSError)(shelf.save, key, attributes, arrays, self._staging.directory())
+        except OSError as error:
+            raise StoreError(
+                f"{key}: its arrays could not be written ({reason(error)}); its runs are kept and the same "
+                "command goes on from them"
+            ) from error
+
     def check(self, on_progress: OnProgress | None = None, processes: int = 1) -> list[str]:
         """Verify every run, boundary and branch, and that directory and catalog name the same runs.
 
@@ -794,6 +835,7 @@ class Store(AbstractContextManager["Store"]):
         list of str
             Problems, one sentence each; empty if the store is whole.
         """
+        from ensemble.store.boundary_arrays import BOUNDARY_ARRAYS
         from ensemble.store.verification import CheckNotes, run_problems
 
         problems = []
@@ -821,7 +863,8 @@ class Store(AbstractContextManager["Store"]):
             notes.write()
             raise
         notes.remove()
-        return [*different, *problems, *self.branches.problems()]
+        grids = self.boundary_grids.problems(BOUNDARY_ARRAYS)
+        return [*different, *problems, *self.branches.problems(), *grids]
 
 
 def _unreadable(record: Record) -> list[str]:

@@ -87,7 +87,7 @@ class BoundaryStore:
 
 
 def answer(task: SearchRun) -> RunAnswer:
-    bound = task.value > 0.1 + 0.571 * task.sweep_value
+    bound = task.value > 0.1 + 0.571 * task.at[0]
     return RunAnswer(Outcome.BOUND if bound else Outcome.SEPARATED)
 
 

@@ -116,10 +116,10 @@ def first_task(path: Path) -> None:
     with Store.open(path) as store:
         study = load_study("critical-hamaker")
         made = store.parameters_within(
-            ParameterRange("flow.rate", min(study.sweep.values), max(study.sweep.values)),
+            ParameterRange("flow.rate", min(study.sweep[0].values), max(study.sweep[0].values)),
             ParameterRange("adhesion.hamaker", *study.search.limits),
         )
-        planner = StudyPlanner(study, store.answer, ((at, value) for at, value in made))
+        planner = StudyPlanner(study, store.answer, (((at,), value) for at, value in made))
         assert planner.next_task() is not None
 
 

@@ -67,7 +67,7 @@ def test_the_section_compares_what_it_asks_for(namespace: dict[str, Any], tmp_pa
 def test_the_study_is_valid() -> None:
     text, _ = blocks("toml")
     study = Study.model_validate(tomllib.loads(text))
-    assert study.scene_at(0.8, 2.0).vesicles[0].reduced_area == 0.8
+    assert study.scene_at((0.8,), 2.0).vesicles[0].reduced_area == 0.8
     assert study.search.low == (Outcome.BOUND,)
 
 

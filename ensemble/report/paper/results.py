@@ -130,4 +130,4 @@ class Results:
         dict of float to BoundaryPoint
             Points by the value of the swept parameter.
         """
-        return {point.parameters[case.study.sweep.parameter]: point for point in self.boundary(case).points}
+        return {point.parameters[case.study.swept[0]]: point for point in self.boundary(case).points}

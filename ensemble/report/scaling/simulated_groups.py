@@ -251,7 +251,7 @@ class _SimulatedGroups:
 
 
 def _answer(task: SearchRun) -> RunAnswer:
-    bound = task.value > 0.1 + 0.571 * task.sweep_value  # nearly the boundary of the default study
+    bound = task.value > 0.1 + 0.571 * task.at[0]  # nearly the boundary of the default study
     return RunAnswer(Outcome.BOUND if bound else Outcome.SEPARATED)
 
 

@@ -64,7 +64,7 @@ def bound_pairs(quick: bool) -> Iterator[BoundPair]:
     study = load_study("critical-hamaker")
     ends = {1.0: UPPER_ENDS[1.0]} if quick else UPPER_ENDS
     for rate, hamaker in ends.items():
-        yield BoundPair(_STUDY, f"shear rate {rate:g}, H {hamaker:.4g}", study.scene_at(rate, hamaker))
+        yield BoundPair(_STUDY, f"shear rate {rate:g}, H {hamaker:.4g}", study.scene_at((rate,), hamaker))
     for rate, hamaker in ends.items():
         for stronger in [multiple * hamaker for multiple in _STRONGER[: 1 if quick else None]]:
             name = f"shear rate {rate:g}, H {stronger:.4g}"

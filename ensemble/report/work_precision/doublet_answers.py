@@ -7,7 +7,8 @@ from ensemble.config.run_key import run_key
 from ensemble.report.timed_runs import TimedRuns
 from ensemble.report.work_precision.work_precision_document import CriticalBracket, DoubletAnswer
 from ensemble.report.work_precision.work_precision_plan import ComparedMethod, WorkPrecisionPlan
-from ensemble.search.study_search import critical_value_search, expected_bracket, side_of
+from ensemble.search.known_brackets import expected_bracket
+from ensemble.search.study_search import critical_value_search, side_of
 from solver.analysis.run import Outcome
 from solver.scene import Scene
 
@@ -112,10 +113,10 @@ def _critical_bracket(runs: TimedRuns, plan: WorkPrecisionPlan, tolerance: float
             f"scene.numerics.tolerance={tolerance!r}",
         ],
     )
-    search = critical_value_search(study, expected_bracket(study, SHEAR_RATE, {}))
+    search = critical_value_search(study, expected_bracket(study, (SHEAR_RATE,), {}))
     keys, seconds = [], 0.0
     while (value := search.ask()) is not None:
-        scene = study.scene_at(SHEAR_RATE, value)
+        scene = study.scene_at((SHEAR_RATE,), value)
         run = runs.summary(scene, f"critical adhesion: tolerance {tolerance:g}, H = {value:.5g}")
         search.tell(value, side_of(study, run.outcome))
         keys.append(run.key)

@@ -97,7 +97,7 @@ def test_a_study_takes_units_in_limits_values_and_guesses() -> None:
         ],
     )
     assert (measured.sweep, measured.search, measured.key) == (twin.sweep, twin.search, twin.key)
-    assert measured.scene_at(0.5, 0.3).units == measured.scene.units
+    assert measured.scene_at((0.5,), 0.3).units == measured.scene.units
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,12 @@ DOUBLET_STUDIES = (
     "critical-hamaker",
     "critical-separation-rate",
 )
-STUDIES = (*DOUBLET_STUDIES, "critical-hamaker-flow-type", "critical-viscosity-contrast")
+STUDIES = (
+    *DOUBLET_STUDIES,
+    "critical-hamaker-flow-type",
+    "critical-hamaker-surface",
+    "critical-viscosity-contrast",
+)
 PUBLISHED = (
     "doublet-draining",
     "doublet-equilibrium",
@@ -72,7 +77,7 @@ def test_every_preset_says_what_it_is_and_where_it_comes_from(name: str) -> None
 def test_no_doublet_starts_in_contact() -> None:
     scenes = [load_scene(name) for name in PUBLISHED]
     for study in map(load_study, DOUBLET_STUDIES):
-        scenes += [study.scene_at(sweep_value, study.search.limits[0]) for sweep_value in study.sweep.values]
+        scenes += [study.scene_at(at, study.search.limits[0]) for at in study.places]
     doublets = [scene.vesicles for scene in scenes if len(scene.vesicles) == 2]
     assert len(doublets) == len(scenes) - 1
     for left, right in doublets:
@@ -111,12 +116,12 @@ def test_tens_of_vesicles_begin_within_reach_of_adhesion_but_apart(name: str) ->
 
 
 def test_scene_at_sets_both_parameters_and_nothing_else() -> None:
-    scene = HAMAKER.scene_at(1.25, 0.8)
+    scene = HAMAKER.scene_at((1.25,), 0.8)
     assert scene.flow == Shear(rate=1.25)
     assert scene.adhesion == PowerLaw(hamaker=0.8, distance=0.4)
     restored = scene.model_copy(update={"flow": HAMAKER.scene.flow, "adhesion": HAMAKER.scene.adhesion})
     assert restored == HAMAKER.scene
-    trap = load_study("critical-extension-rate").scene_at(0.65, 0.1)
+    trap = load_study("critical-extension-rate").scene_at((0.65,), 0.1)
     assert [vesicle.reduced_area for vesicle in trap.vesicles] == [0.65, 0.65]
 
 

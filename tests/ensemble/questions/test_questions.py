@@ -65,13 +65,11 @@ def test_the_scene_that_decides_about_ranks_is_that_of_the_document() -> None:
 def test_two_runs_at_finer_numerics_are_planned_at_each_point() -> None:
     study = load_study("critical-hamaker")
     finer = [
-        (certifying_scene(study.scene_at(sweep_value, end)), 2)
-        for sweep_value in study.sweep.values
-        for end in study.search.limits
+        (certifying_scene(study.scene_at(at, end)), 2) for at in study.places for end in study.search.limits
     ]
     for changes in ({}, {"search.certify": True}):  # a certification takes over the runs that confirm
         planned = list(preset_question("critical-hamaker", changes).planned_runs())
-        assert sum(planned.count(each) for each in finer) == len(study.sweep.values)
+        assert sum(planned.count(each) for each in finer) == len(study.places)
         assert sum(count for _, count in planned) > 2 * len(planned)
 
 

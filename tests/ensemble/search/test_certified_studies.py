@@ -54,8 +54,8 @@ def unknown(_: str) -> None:
     return None
 
 
-def places(tasks: list[SearchRun]) -> list[tuple[float, float]]:
-    return [(task.sweep_value, task.value) for task in tasks]
+def places(tasks: list[SearchRun]) -> list[tuple[tuple[float, ...], float]]:
+    return [(task.at, task.value) for task in tasks]
 
 
 def uncertified_study(sweep_values: str, *changes: str) -> Study:
@@ -190,8 +190,8 @@ def test_a_contradiction_at_the_finer_numerics_is_reported(study: Study) -> None
     def contrary(task: SearchRun) -> Outcome:
         """Two finer runs of a point, those at the ends of its bracket, come out on the wrong sides."""
         if is_finer(task):
-            values.setdefault(task.sweep_value, []).append(task.value)
-            if len(values[task.sweep_value]) <= 2:
+            values.setdefault(task.at[0], []).append(task.value)
+            if len(values[task.at[0]]) <= 2:
                 return swapped[physics(task)]
         return physics(task)
 
@@ -251,15 +251,15 @@ def test_certifying_comes_before_a_second_task_of_one_search() -> None:
         task = planner.next_task()
         assert task is not None
         tasks.append(task)
-        if task.sweep_value == 0.5 and not is_finer(task):
+        if task.at[0] == 0.5 and not is_finer(task):
             planner.answer(task, RunAnswer(physics(task)))
     following = []
     for _ in range(3):
         task = planner.next_task()
         assert task is not None
         following.append(task)
-    assert tasks[-1].sweep_value == 0.5
-    assert [(task.sweep_value, is_finer(task)) for task in following] == [
+    assert tasks[-1].at == (0.5,)
+    assert [(task.at[0], is_finer(task)) for task in following] == [
         (1.0, False),
         (0.5, True),
         (1.0, False),
@@ -271,9 +271,9 @@ def test_a_search_that_others_finish_meanwhile_is_certified_at_once() -> None:
     known: dict[str, RunAnswer] = {}
     planner, physics = StudyPlanner(one_point, known.get), TwoNumerics()
     out = planner.next_task()
-    scenes = [one_point.scene_at(0.5, GRID.value(index)) for index in INDICES]
+    scenes = [one_point.scene_at((0.5,), GRID.value(index)) for index in INDICES]
     tasks = [
-        SearchRun(sweep_value=0.5, value=GRID.value(i), scene=scene, key=run_key(scene))
+        SearchRun(at=(0.5,), value=GRID.value(i), scene=scene, key=run_key(scene))
         for i, scene in zip(INDICES, scenes, strict=True)
     ]
     known.update({task.key: RunAnswer(physics(task)) for task in tasks})

@@ -74,7 +74,7 @@ def test_what_is_known_is_never_run_again_and_changes_nothing(shift: float, kept
     first = StudyPlanner(study, unknown)
     made = trace(first, physics, 3, lambda out: out - 1)
     known = {task.key: physics(task) for index, task in enumerate(made) if index in kept}
-    resumed = StudyPlanner(study, known.get, [(task.sweep_value, task.value) for task in made])
+    resumed = StudyPlanner(study, known.get, [(task.at, task.value) for task in made])
     again = trace(resumed, physics, 2)
     assert answers(resumed.boundary().points) == answers(first.boundary().points)
     assert not {task.key for task in again} & known.keys()

@@ -92,7 +92,7 @@ def test_what_is_known_is_never_run_again_and_changes_nothing(study: Study, kept
     first = StudyPlanner(study, unknown)
     made = run_study(first, 3, lambda out: out - 1)
     known = {task.key: RunAnswer(outcome_of(task)) for index, task in enumerate(made) if index in kept}
-    resumed = StudyPlanner(study, known.get, [(task.sweep_value, task.value) for task in made])
+    resumed = StudyPlanner(study, known.get, [(task.at, task.value) for task in made])
     assert resumed.known_answers == len(known)
     again = run_study(resumed, 2, lambda out: 0)
     assert brackets(resumed) == brackets(first)
@@ -103,7 +103,7 @@ def test_a_study_with_every_answer_has_no_task(study: Study) -> None:
     first = StudyPlanner(study, unknown)
     made = run_study(first, 2, lambda out: 0)
     known = {task.key: RunAnswer(outcome_of(task)) for task in made}
-    again = StudyPlanner(study, known.get, [(task.sweep_value, task.value) for task in made])
+    again = StudyPlanner(study, known.get, [(task.at, task.value) for task in made])
     assert again.done
     assert again.next_task() is None
     assert [point.runs for point in again.boundary().points] == [
@@ -114,7 +114,7 @@ def test_a_study_with_every_answer_has_no_task(study: Study) -> None:
 def test_runs_of_other_scenes_are_no_answers(study: Study) -> None:
     task = StudyPlanner(study, unknown).next_task()
     assert task is not None
-    place = (task.sweep_value, task.value)
+    place = (task.at, task.value)
     known = {task.key: RunAnswer(Outcome.BOUND)}
     assert StudyPlanner(study, known.get, [place]).known_answers == 1, "same place, found by the key"
     assert StudyPlanner(study, {"another": RunAnswer(Outcome.BOUND)}.get, [place]).known_answers == 0
@@ -123,7 +123,7 @@ def test_runs_of_other_scenes_are_no_answers(study: Study) -> None:
 def test_workers_get_different_searches_before_any_search_gets_two(study: Study) -> None:
     planner = StudyPlanner(study, unknown)
     tasks = [planner.next_task() for _ in range(6)]
-    rates = [task.sweep_value for task in tasks if task is not None]
+    rates = [task.at[0] for task in tasks if task is not None]
     assert rates == [0.25, 0.75, 1.5, 0.25, 0.75, 1.5]
 
 
@@ -228,7 +228,7 @@ def test_finished_searches_tell_the_later_ones_where_to_begin() -> None:
     rates = [0.25, 0.5, 0.75, 1.0, 1.25, 1.5]
     unguided = ["search.guesses=[]", "search.tolerance=0.01", "search.scan=0"]
     whole = load_study("critical-hamaker", unguided)
-    assert list(whole.sweep.values) == rates
+    assert list(whole.sweep[0].values) == rates
     together = len(run_study(StudyPlanner(whole, unknown), 1, lambda out: 0))
     points = [load_study("critical-hamaker", [*unguided, f"sweep.values=[{rate}]"]) for rate in rates]
     apart = sum(len(run_study(StudyPlanner(point, unknown), 1, lambda out: 0)) for point in points)

@@ -106,7 +106,7 @@ def _limits(
         draw_brackets(axes, results.brackets(study), BLACK, "bisection")
         folds = [
             (area, row.computed)
-            for area, row in zip(sorted(study.study.sweep.values), rows, strict=True)
+            for area, row in zip(sorted(study.study.sweep[0].values), rows, strict=True)
             if row.computed is not None
         ]
         axes.plot(*np.reshape(folds, (-1, 2)).T, "D", color=VERMILLION, markersize=4, label="fold")

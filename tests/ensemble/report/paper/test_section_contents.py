@@ -57,14 +57,14 @@ def traced(case: StudyCase) -> Boundary:
     study = case.study
     points = [
         BoundaryPoint(
-            parameters={study.sweep.parameter: at},
+            parameters={study.sweep[0].parameter: at},
             bracket=(0.1 + 0.55 * at, 0.11 + 0.55 * at),
             outcomes=("separated", "bound"),
             status="converged",
             certified=False,
             runs=[],
         )
-        for at in study.sweep.values
+        for at in study.sweep[0].values
     ]
     return Boundary(
         study_key=study.key,

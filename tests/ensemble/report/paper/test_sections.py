@@ -21,8 +21,8 @@ def test_a_section_asks_for_scenes_and_studies_that_are_valid(section) -> None:
     quick, full = (next(section.generate(quick)) for quick in (True, False))
     for plan in (quick, full):
         assert all(case.scene.horizon > 0 for case in plan.cases)
-        assert all(case.study.sweep.values for case in plan.studies)
-    values = [sum(len(case.study.sweep.values) for case in plan.studies) for plan in (quick, full)]
+        assert all(case.study.sweep[0].values for case in plan.studies)
+    values = [sum(len(case.study.sweep[0].values) for case in plan.studies) for plan in (quick, full)]
     assert len({case.key for case in quick.cases}) <= len({case.key for case in full.cases})
     assert values[0] <= values[1]
 

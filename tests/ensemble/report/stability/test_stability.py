@@ -66,9 +66,9 @@ def test_the_extreme_scenes_reach_what_they_should():
 def test_the_bound_pairs_are_those_of_the_default_study_and_twenty_more() -> None:
     pairs = list(bound_pairs(quick=False))
     study = load_study("critical-hamaker")
-    assert list(study.sweep.values) == list(UPPER_ENDS)
+    assert list(study.sweep[0].values) == list(UPPER_ENDS)
     of_study = [pair.scene for pair in pairs if pair.group == "default study"]
-    assert of_study == [study.scene_at(rate, hamaker) for rate, hamaker in UPPER_ENDS.items()]
+    assert of_study == [study.scene_at((rate,), hamaker) for rate, hamaker in UPPER_ENDS.items()]
     assert len(pairs) == len({pair.name for pair in pairs}) == len(of_study) + 20
     assert len(list(bound_pairs(quick=True))) == 3
 
