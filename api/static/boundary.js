@@ -1,7 +1,7 @@
 /** A boundary: its phase diagram, its points, its runs, and values read from it. */
 
 import { changesOf, get, getAll } from "./api.js";
-import { otherChanges, phaseDiagram } from "./diagram.js";
+import { otherChanges, phaseDiagram, placeOf, sweepsOf } from "./diagram.js";
 import { DiagramKeys } from "./diagram_keys.js";
 import { definitions, element, table } from "./dom.js";
 import { downloads } from "./downloads.js";
@@ -10,6 +10,7 @@ import { outcomeLabel } from "./outcomes.js";
 import { Plot } from "./plot.js";
 import { alertAbout } from "./problems.js";
 import { goTo } from "./router.js";
+import { surfaceCurves, surfaceMap } from "./surface.js";
 import { describe, quantity, valueAt } from "./symbols.js";
 
 /**
@@ -61,9 +62,8 @@ class Marks {
    * @returns {Promise<Mark[]>}
    */
   async of(boundary) {
-    const { scene, sweep, search } = boundary.study;
-    const paths = [sweep.parameter, search.parameter];
-    const symbols = paths.map((path) => quantity(path, scene).symbol);
+    const paths = pathsOf(boundary);
+    const symbols = symbolsOf(boundary);
     const keys = boundary.points.flatMap((point) => point.runs);
     if (!keys.every((key) => this.#summaries.has(key))) {
       for (const run of await getAll(`/boundaries/${this.boundary}/runs?limit=${RUNS_AT_ONCE}`, this.signal)) {
@@ -72,10 +72,26 @@ class Marks {
     }
     const runs = keys.flatMap((key) => this.#summaries.get(key) ?? []);
     return runs.map((run) => {
-      const [x, y] = paths.map((path) => valueAt(run.scene, path));
-      return { key: run.key, outcome: run.outcome, x, y, text: textOf(run, [x, y], symbols) };
+      const values = paths.map((path) => valueAt(run.scene, path));
+      const at = values.slice(0, -1);
+      const text = textOf(run, values, symbols);
+      return { key: run.key, outcome: run.outcome, at, x: at[0], y: values[at.length], text };
     });
   }
+}
+
+/**
+ * The paths of the swept parameters and of the searched one.
+ *
+ * @param {Boundary} boundary
+ */
+function pathsOf({ study }) {
+  return [...sweepsOf(study).map(({ parameter }) => parameter), study.search.parameter];
+}
+
+/** @param {Boundary} boundary */
+function symbolsOf(boundary) {
+  return pathsOf(boundary).map((path) => quantity(path, boundary.study.scene).symbol);
 }
 
 /**
@@ -112,13 +128,16 @@ class BoundaryView {
     this.compared = compared;
     this.heading = element("div", { class: "heading" });
     this.figure = element("div", { class: "plot diagram", role: "application", tabindex: 0 });
-    const status = element("p", { class: "note", role: "status" });
+    this.status = element("p", { class: "note", role: "status" });
+    this.map = element("div", { class: "plot", role: "application" });
     this.points = element("section", { "aria-label": "Points of the boundary" });
     this.runs = element("details", { class: "runs" });
     this.reading = element("section", {});
     this.files = element("div", {});
     this.plot = new Plot(this.figure, signal);
-    this.keys = new DiagramKeys(this.plot, status);
+    /** @type {DiagramKeys | null} */
+    this.keys = null;
+    this.mapPlot = new Plot(this.map, signal);
     this.plot.on(
       "plotly_click",
       ({ points: [point] }) => point.customdata && goTo(`/runs/${point.customdata}`),
@@ -128,7 +147,7 @@ class BoundaryView {
       element(
         "div",
         { class: "columns" },
-        element("div", {}, this.figure, status, this.files, this.runs),
+        element("div", {}, this.figure, this.status, this.map, this.files, this.runs),
         element("div", {}, this.points, this.reading),
       ),
     );
@@ -139,7 +158,6 @@ class BoundaryView {
    * @param {Mark[]} marks
    */
   show(boundary, marks) {
-    const { scene, sweep, search } = boundary.study;
     const state = stateOfAll(boundary.points);
     this.heading.replaceChildren(
       element("h1", {}, titleOf(boundary)),
@@ -149,12 +167,11 @@ class BoundaryView {
         "p",
         {},
         element("code", {}, boundary.name),
-        `: ${describe(scene, [sweep.parameter, search.parameter])}`,
+        `: ${describe(boundary.study.scene, pathsOf(boundary))}`,
       ),
     );
     this.figure.setAttribute("aria-label", summary(boundary, marks));
-    void this.plot.draw(() => phaseDiagram(boundary, marks, this.compared));
-    this.keys.follow(marks);
+    this.#draw(boundary, marks);
     this.points.replaceChildren(pointsTable(boundary, marks));
     if (!this.files.hasChildNodes()) {
       const key = boundary.study_key;
@@ -172,18 +189,34 @@ class BoundaryView {
    * @param {Boundary} boundary
    * @param {Mark[]} marks
    */
+  #draw(boundary, marks) {
+    const [, ...others] = sweepsOf(boundary.study);
+    if (others.length === 0) {
+      void this.plot.draw(() => phaseDiagram(boundary, marks, this.compared));
+      this.keys ??= new DiagramKeys(this.plot, this.status);
+      this.keys.follow(marks);
+      return;
+    }
+    void this.plot.draw(() => surfaceCurves(boundary));
+    if (others.length === 1) {
+      this.map.setAttribute("aria-label", `Map. ${titleOf(boundary)}`);
+      void this.mapPlot.draw(() => surfaceMap(boundary));
+    }
+  }
+
+  /**
+   * @param {Boundary} boundary
+   * @param {Mark[]} marks
+   */
   #showRuns(boundary, marks) {
-    const { scene, sweep, search } = boundary.study;
-    const symbols = [sweep.parameter, search.parameter].map((path) => quantity(path, scene).symbol);
-    const rows = marks.map(({ key, x, y, outcome }) => [
-      number(x),
-      number(y),
+    const rows = marks.map(({ key, at, y, outcome }) => [
+      ...[...at, y].map((value) => number(value)),
       outcomeLabel(outcome),
       element("a", { href: `#/runs/${key}` }, "Play"),
     ]);
     this.runs.replaceChildren(
       element("summary", {}, `All ${marks.length} runs`),
-      table("Runs", [...symbols, "Outcome", "Run"], rows),
+      table("Runs", [...symbolsOf(boundary), "Outcome", "Run"], rows),
     );
   }
 
@@ -198,8 +231,11 @@ class BoundaryView {
 }
 
 /** @param {Boundary} boundary */
-function titleOf({ study: { scene, sweep, search } }) {
-  return `Critical ${quantity(search.parameter, scene).name} against ${quantity(sweep.parameter, scene).name}`;
+function titleOf({ study }) {
+  const [searched, ...swept] = [study.search, ...sweepsOf(study)].map(
+    ({ parameter }) => quantity(parameter, study.scene).name,
+  );
+  return `Critical ${searched} against ${swept.join(" and ")}`;
 }
 
 /**
@@ -217,24 +253,19 @@ function summary(boundary, marks) {
  * @param {Mark[]} marks
  */
 function pointsTable(boundary, marks) {
-  const { scene, sweep, search } = boundary.study;
+  const symbols = symbolsOf(boundary);
   const rows = boundary.points.map((point) => [
-    number(point.parameters[sweep.parameter]),
+    ...placeOf(point, boundary).map((value) => number(value)),
     [point, ...otherChanges(point)].flatMap(({ bracket }, index) => [
       index > 0 ? "; also " : "",
-      bracketLinks(bracket, point.parameters[sweep.parameter], marks),
+      bracketLinks(bracket, placeOf(point, boundary), marks),
     ]),
     element("span", { class: `state ${stateOf(point)}` }, point.certified ? "certified" : point.status),
     scannedText(point),
   ]);
   return table(
     "Points of the boundary",
-    [
-      quantity(sweep.parameter, scene).symbol,
-      `Critical ${quantity(search.parameter, scene).symbol}`,
-      "Status",
-      "Scanned",
-    ],
+    [...symbols.slice(0, -1), `Critical ${symbols[symbols.length - 1]}`, "Status", "Scanned"],
     rows,
   );
 }
@@ -243,17 +274,17 @@ function pointsTable(boundary, marks) {
  * Write a bracket whose ends lead to their runs.
  *
  * @param {[number | null, number | null]} bracket
- * @param {number} at - Value of the swept parameter.
+ * @param {number[]} place - Values of the swept parameters.
  * @param {Mark[]} marks
  * @returns {import("./dom.js").Child}
  */
-function bracketLinks(bracket, at, marks) {
+function bracketLinks(bracket, place, marks) {
   const [low, high] = bracket;
   if (low === null || high === null) {
     return interval(bracket);
   }
   const links = ends([low, high]).map((text, index) => {
-    const mark = marks.find(({ x, y }) => x === at && y === bracket[index]);
+    const mark = marks.find(({ at, y }) => y === bracket[index] && at.join() === place.join());
     return mark ? element("a", { href: `#/runs/${mark.key}`, title: mark.outcome }, text) : text;
   });
   return [links[0], " – ", links[1]];
@@ -291,22 +322,27 @@ function stateOfAll(points) {
 }
 
 /**
- * Make a form that reads a critical value at a value of the swept parameter.
+ * Make a form that reads a critical value at values of the swept parameters.
  *
  * @param {Boundary} boundary
  * @param {AbortSignal} signal
  */
 function readingForm(boundary, signal) {
-  const { scene, sweep, search } = boundary.study;
-  const [swept, searched] = [sweep.parameter, search.parameter].map((path) => quantity(path, scene));
-  const input = element("input", { id: "reading-at", type: "number", step: "any", required: true });
+  const { scene, search } = boundary.study;
+  const searched = quantity(search.parameter, scene);
+  const inputs = sweepsOf(boundary.study).map(({ parameter }, index) => {
+    const { name, symbol } = quantity(parameter, scene);
+    const id = `reading-at-${index}`;
+    const input = element("input", { id, name: parameter, type: "number", step: "any", required: true });
+    return { input, label: element("label", { for: id }, `${index > 0 ? "and" : "At"} ${name} ${symbol}`) };
+  });
   const answer = element("div", { "aria-live": "polite" });
 
   /** @param {SubmitEvent} event */
   async function read(event) {
     event.preventDefault();
     try {
-      const query = new URLSearchParams({ [sweep.parameter]: input.value });
+      const query = new URLSearchParams(inputs.map(({ input }) => [input.name, input.value]));
       const { critical_value, uncertainty, method } = await get(
         `/boundaries/${boundary.study_key}/at?${query}`,
         signal,
@@ -328,8 +364,7 @@ function readingForm(boundary, signal) {
     element(
       "form",
       { class: "inline", onsubmit: read },
-      element("label", { for: "reading-at" }, `At ${swept.name} ${swept.symbol}`),
-      input,
+      ...inputs.flatMap(({ input, label }) => [label, input]),
       element("button", {}, "Read"),
     ),
     answer,

@@ -36,7 +36,8 @@ import { color } from "./theme.js";
  *
  * @typedef {object} Mark - A run in the plane of the two parameters.
  * @property {string} key
- * @property {number} x
+ * @property {number[]} at - Values of the swept parameters.
+ * @property {number} x - The first of them.
  * @property {number} y
  * @property {string} outcome
  * @property {string[]} text - What is said of it: outcome, place, results and errors.
@@ -52,8 +53,8 @@ const LAST_IN_LEGEND = 2000; // the default of Plotly is 1000
  * @returns {Figure}
  */
 export function phaseDiagram(boundary, marks, compared) {
-  const { scene, sweep, search } = boundary.study;
-  const x = quantity(sweep.parameter, scene);
+  const { scene, search } = boundary.study;
+  const x = quantity(sweepsOf(boundary.study)[0].parameter, scene);
   const y = quantity(search.parameter, scene);
   const points = bracketed(boundary);
   return {
@@ -82,18 +83,38 @@ export function phaseDiagram(boundary, marks, compared) {
 }
 
 /**
- * The points of a boundary that have a bracket, along the sweep.
+ * The sweeps of a study: a table if there is one.
+ *
+ * @param {any} study
+ * @returns {{parameter: string, values: number[]}[]}
+ */
+export function sweepsOf({ sweep }) {
+  return Array.isArray(sweep) ? sweep : [sweep];
+}
+
+/**
+ * The values of the swept parameters at a point.
+ *
+ * @param {Point} point
+ * @param {Boundary} boundary
+ */
+export function placeOf(point, boundary) {
+  return sweepsOf(boundary.study).map(({ parameter }) => point.parameters[parameter]);
+}
+
+/**
+ * The points of a boundary that have a bracket, along the first sweep.
  *
  * @param {Boundary} boundary
  */
-function bracketed(boundary) {
+export function bracketed(boundary) {
   return boundary.points
     .filter((point) => point.bracket.every((end) => end !== null))
     .sort((first, second) => at(first, boundary) - at(second, boundary));
 }
 
 /** @param {{name: string, symbol: string}} quantity */
-function title({ name, symbol }) {
+export function title({ name, symbol }) {
   return name === symbol ? name : `${name} ${symbol}`;
 }
 
@@ -102,7 +123,7 @@ function title({ name, symbol }) {
  * @param {Boundary} boundary
  */
 function at(point, boundary) {
-  return point.parameters[boundary.study.sweep.parameter];
+  return placeOf(point, boundary)[0];
 }
 
 /**
@@ -113,7 +134,7 @@ function at(point, boundary) {
  * @param {Boundary | null} compared
  */
 function range(boundary, marks, compared) {
-  const swept = [boundary, compared].flatMap((each) => each?.study.sweep.values ?? []);
+  const swept = [boundary, compared].flatMap((each) => (each ? sweepsOf(each.study)[0].values : []));
   const all = [...swept, ...marks.map((mark) => mark.x)];
   const [low, high] = [Math.min(...all), Math.max(...all)];
   const margin = 0.07 * (high - low) || 0.1 * Math.abs(high) || 1;

@@ -96,11 +96,11 @@ export class FormDocument {
       unions.some((union) => path === union || path.startsWith(`${union}.`));
     const ofScene = OF_SCENE.map((path) => this.prefix + path);
     const principal = [NAME, ...this.kind.principal_fields, ...ofScene];
-    const rank = (/** @type {Field} */ { path }) =>
-      principal.includes(path) ? principal.indexOf(path) : principal.length;
+    const place = (/** @type {string} */ path) => principal.indexOf(path.replaceAll(/\.\d+/g, ""));
+    const rank = (/** @type {Field} */ { path }) => (place(path) < 0 ? principal.length : place(path));
     return leaves(this.document)
       .filter(([path]) => !isInside(path) && !this.#varied.includes(path))
-      .map(([path, value]) => this.#field(path, value, principal.includes(path)))
+      .map(([path, value]) => this.#field(path, value, place(path) >= 0))
       .sort((first, second) => rank(first) - rank(second));
   }
 

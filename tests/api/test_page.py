@@ -275,6 +275,44 @@ def test_two_boundaries_on_one_diagram(page: Page, url: str, boundary: str, stor
     assert bars[0.5] > 2 * bars[1.0]
 
 
+def test_a_surface_is_curves_and_a_map_and_is_read_at_two_values(page: Page, url: str, store: Path) -> None:
+    study = load_study("critical-hamaker-surface")
+    points = [
+        BoundaryPoint(
+            parameters=dict(zip(study.swept, (rate, area), strict=True)),
+            bracket=(rate * area / 1.01, rate * area * 1.01),
+            outcomes=("separated", "bound"),
+            status="converged",
+            certified=False,
+            runs=[],
+        )
+        for rate, area in study.places
+    ]
+    with Store.open(store) as opened:
+        opened.save_boundary(
+            Boundary(
+                study_key=study.key,
+                study=study.model_dump(mode="json"),
+                name=study.name,
+                points=points,
+                updated=EARLIER,
+            )
+        )
+    page.goto(f"{url}/#/boundaries/{study.key}")
+    expect(page.get_by_role("heading", level=1)).to_have_text(
+        "Critical Hamaker constant against shear rate and reduced area"
+    )
+    expect(page.locator(".diagram .scatterlayer .trace")).to_have_count(2)
+    expect(page.locator(".contourlayer .contour")).to_have_count(1)
+    expect(page.locator(".diagram .legendtext").first).to_contain_text("ΔA = 0.8")
+    page.get_by_label("At shear rate").fill("0.75")
+    page.get_by_label("and reduced area").fill("0.85")
+    page.get_by_role("button", name="Read").click()
+    expect(page.get_by_text(f"{0.75 * 0.85:.4g}", exact=True)).to_be_visible()
+    page.goto(f"{url}/#/new?preset=critical-hamaker-surface")
+    expect(page.get_by_label("values of the reduced area")).to_have_value(re.compile("0.8.*0.9"))
+
+
 def test_the_name_of_a_study_is_not_interpreted_as_html(page: Page, url: str, store: Path) -> None:
     study = load_study("critical-hamaker")
     name = "<img src=x onerror=alert(1)>"

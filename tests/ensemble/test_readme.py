@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import ensemble
+from ensemble.config.documents import preset_document
 from ensemble.config.study import Study
 from ensemble.report.paper.results import Results
 from ensemble.store import Store
@@ -65,10 +66,12 @@ def test_the_section_compares_what_it_asks_for(namespace: dict[str, Any], tmp_pa
 
 
 def test_the_study_is_valid() -> None:
-    text, _ = blocks("toml")
+    text, sweeps, _ = blocks("toml")
     study = Study.model_validate(tomllib.loads(text))
     assert study.scene_at((0.8,), 2.0).vesicles[0].reduced_area == 0.8
     assert study.search.low == (Outcome.BOUND,)
+    surface = preset_document("critical-hamaker-surface")
+    assert Study.model_validate(surface | tomllib.loads(sweeps)).places[-1] == (1.5, 0.9)
 
 
 def test_all_folders_are_listed() -> None:

@@ -2,6 +2,7 @@
 
 import { get, getAll } from "../api.js";
 import { followBoundary } from "../boundary.js";
+import { sweepsOf } from "../diagram.js";
 import { element } from "../dom.js";
 import { dateAndTime, words } from "../format.js";
 import { submitButton } from "../job.js";
@@ -70,11 +71,12 @@ function invitation(hasRuns) {
  * @param {Boundary | null} compared
  */
 function comparison(boundaries, current, compared) {
-  const parameters = (/** @type {Boundary} */ { study: { sweep, search } }) => `${sweep.parameter} ${search.parameter}`;
+  const parameters = (/** @type {Boundary} */ { study }) =>
+    [...sweepsOf(study), study.search].map(({ parameter }) => parameter).join(" ");
   const alike = boundaries.filter(
     (each) => each.study_key !== current.study_key && parameters(each) === parameters(current),
   );
-  if (alike.length === 0) {
+  if (alike.length === 0 || sweepsOf(current.study).length > 1) {
     return [];
   }
   const menu = element(

@@ -1,0 +1,133 @@
+/**
+ * The boundary of a study that sweeps several parameters: curves of the first one, and a filled map of two.
+ *
+ * Pure functions from documents of the service to figures, which `Plot` draws.
+ */
+
+import { bracketed, placeOf, sweepsOf, title } from "./diagram.js";
+import { number } from "./format.js";
+import { axis } from "./plot.js";
+import { quantity } from "./symbols.js";
+import { color } from "./theme.js";
+
+/**
+ * @typedef {import("./diagram.js").Boundary} Boundary
+ * @typedef {import("./diagram.js").Point} Point
+ * @typedef {import("./plot.js").Figure} Figure
+ */
+
+// Viridis without its pale end, which would vanish on a light page.
+const FIRST_TO_LAST = ["#440154", "#46327e", "#365c8d", "#277f8e", "#1fa187", "#4ac16d", "#a0da39"];
+const COLORSCALE = FIRST_TO_LAST.map((name, index) => [index / (FIRST_TO_LAST.length - 1), name]);
+
+const LAYOUT = { height: 420, margin: { l: 64, r: 16, t: 12, b: 56 }, hovermode: "closest" };
+
+/**
+ * Draw a curve of the first parameter, with brackets, for each value of the others.
+ *
+ * @param {Boundary} boundary
+ * @returns {Figure}
+ */
+export function surfaceCurves(boundary) {
+  const { scene, search } = boundary.study;
+  const [first, ...others] = sweepsOf(boundary.study).map(({ parameter }) => quantity(parameter, scene));
+  const searched = quantity(search.parameter, scene);
+  const curves = curvesOf(boundary);
+  return {
+    data: curves.map((points, index) =>
+      curve(boundary, points, others, colorAt(curves.length > 1 ? index / (curves.length - 1) : 0)),
+    ),
+    layout: {
+      ...LAYOUT,
+      xaxis: axis({ title: { text: title(first), standoff: 12 } }),
+      yaxis: axis({ title: { text: `critical ${title(searched)}`, standoff: 12 }, rangemode: "normal" }),
+      legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom", font: { size: 12, color: color("muted") } },
+    },
+  };
+}
+
+/**
+ * The points that have a bracket, in groups that differ in the first parameter only.
+ *
+ * @param {Boundary} boundary
+ */
+function curvesOf(boundary) {
+  /** @type {Map<string, Point[]>} */
+  const curves = new Map();
+  for (const point of bracketed(boundary)) {
+    const others = placeOf(point, boundary).slice(1).join();
+    curves.set(others, [...(curves.get(others) ?? []), point]);
+  }
+  return [...curves.values()];
+}
+
+/**
+ * @param {Boundary} boundary
+ * @param {Point[]} points - Of the curve.
+ * @param {{symbol: string}[]} others - The parameters that do not change along it.
+ * @param {string} stroke
+ */
+function curve(boundary, points, others, stroke) {
+  const places = points.map((point) => placeOf(point, boundary));
+  const critical = points.map((point) => point.critical_value ?? NaN);
+  return {
+    type: "scatter",
+    mode: "lines+markers",
+    name: others.map(({ symbol }, index) => `${symbol} = ${number(places[0][index + 1])}`).join(", "),
+    showlegend: true,
+    x: places.map(([x]) => x),
+    y: critical,
+    line: { color: stroke, width: 1.8 },
+    marker: { color: stroke, size: 4 },
+    error_y: {
+      type: "data",
+      symmetric: false,
+      array: points.map(({ bracket: [, high] }, index) => (high ?? NaN) - critical[index]),
+      arrayminus: points.map(({ bracket: [low] }, index) => critical[index] - (low ?? NaN)),
+      color: stroke,
+      thickness: 1.2,
+      width: 3,
+    },
+  };
+}
+
+/** @param {number} share - From 0 to 1. */
+function colorAt(share) {
+  return FIRST_TO_LAST[Math.round(share * (FIRST_TO_LAST.length - 1))];
+}
+
+/**
+ * Draw the critical values over two parameters as a filled map.
+ *
+ * @param {Boundary} boundary
+ * @returns {Figure}
+ */
+export function surfaceMap(boundary) {
+  const { scene, search } = boundary.study;
+  const [first, second] = sweepsOf(boundary.study);
+  const [x, y] = [first, second].map(({ values }) => [...values].sort((one, other) => one - other));
+  const known = new Map(
+    boundary.points.map((point) => [placeOf(point, boundary).join(), point.critical_value]),
+  );
+  const [across, up] = [first, second].map(({ parameter }) => title(quantity(parameter, scene)));
+  return {
+    data: [
+      {
+        type: "contour",
+        x,
+        y,
+        z: y.map((other) => x.map((at) => known.get([at, other].join()) ?? null)),
+        colorscale: COLORSCALE,
+        colorbar: { title: { text: `critical ${quantity(search.parameter, scene).symbol}` }, thickness: 14 },
+        contours: { coloring: "fill" },
+        line: { width: 0 },
+        hovertemplate: "%{x}, %{y}: %{z:.4g}<extra></extra>",
+      },
+    ],
+    layout: {
+      ...LAYOUT,
+      xaxis: axis({ title: { text: across, standoff: 12 } }),
+      yaxis: axis({ title: { text: up, standoff: 12 } }),
+    },
+  };
+}
