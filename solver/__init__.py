@@ -8,6 +8,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from solver.analysis.membrane_forces import MembraneForces, membrane_forces
     from solver.analysis.run import Energy, Errors, Frames, Outcome, Run, Series, Viscosity, Work
     from solver.revision import RESULTS_REVISION
     from solver.scene import Scene
@@ -18,6 +19,7 @@ __all__ = [
     "Energy",
     "Errors",
     "Frames",
+    "MembraneForces",
     "Outcome",
     "Run",
     "Scene",
@@ -25,13 +27,16 @@ __all__ = [
     "Simulation",
     "Viscosity",
     "Work",
+    "membrane_forces",
     "simulate",
 ]
 
 _MODULES = {
+    "MembraneForces": "solver.analysis.membrane_forces",
     "RESULTS_REVISION": "solver.revision",
     "Scene": "solver.scene",
     "Simulation": "solver.simulation.simulate",
+    "membrane_forces": "solver.analysis.membrane_forces",
     "simulate": "solver.simulation.simulate",
 }  # of the others: that of results
 

@@ -185,6 +185,7 @@ ENERGY_PER_DEPTH = Dimension("energy per depth", "J/m", length=-1, bending_modul
 TENSION = Dimension("tension", "N/m", length=-2, bending_modulus=1)
 ADHESION_ENERGY = Dimension("adhesion energy per area", "J/m^2", length=-2, bending_modulus=1)
 HAMAKER = Dimension("Hamaker constant", "Pa", length=-3, bending_modulus=1)
+FORCE_PER_AREA = Dimension("force per area", "Pa", length=-3, bending_modulus=1)
 ANGLE = Dimension("angle", "rad")
 NUMBER = Dimension("number", "1")
 

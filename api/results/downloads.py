@@ -36,6 +36,7 @@ class RunFile(StrEnum):
     """What a run can be downloaded as; the value is the suffix of the file."""
 
     HDF5 = "h5"
+    VTK = "vtkhdf"
     GIF = "gif"
     MP4 = "mp4"
     PNG = "png"
@@ -55,6 +56,7 @@ class BoundaryFile(StrEnum):
 # By suffix, which formats of runs and of boundaries share.
 MEDIA_TYPES: Mapping[str, str] = {
     "h5": "application/x-hdf5",
+    "vtkhdf": "application/x-hdf5",
     "gif": "image/gif",
     "mp4": "video/mp4",
     "png": "image/png",
@@ -112,7 +114,8 @@ class Downloads:
             self._free.release()
 
     def _make(self, key: str, path: Path) -> None:
-        made = ["export", key, str(path)] if path.suffix == ".h5" else ["show", key, "--output", str(path)]
+        exported = path.suffix in (".h5", ".vtkhdf")
+        made = ["export", key, str(path)] if exported else ["show", key, "--output", str(path)]
         command = [sys.executable, "-P", "-m", "api.worker.background", str(self._memory), *made]
         try:
             result = subprocess.run(

@@ -231,19 +231,30 @@ def merge(  # numpydoc ignore=PR01
 
 def export(  # numpydoc ignore=PR01
     key: Annotated[str, typer.Argument(metavar="RUN", help="Key of the run or its beginning.")],
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="HDF5 file to write.")],
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE",
+            help="File to write: .h5, .hdf5 or .nc (HDF5 after netCDF-4), or .vtkhdf for ParaView.",
+        ),
+    ],
+    forces: Annotated[
+        bool, typer.Option("--forces", help="With the forces of bending, tension and adhesion at the points.")
+    ] = False,
     units: UnitsOf = None,
     store: StorePath = DEFAULT_STORE,
 ) -> None:
-    """Write a run to a single HDF5 file."""
-    from ensemble.store.hdf5_export import export_run
+    """Write a run to a single file for other programs."""
+    from ensemble.store.exports import exported_arrays, writer_for
 
+    with refusing():
+        write = writer_for(file)
     with refusing(), _existing(store) as opened:
         key = opened.full_key(key)
         summary = opened.summary(key)
         if units is not None:
             summary = summary.in_units(_units_of(units))
-        export_run(summary, replace(opened.load(key), scene=summary.scene), file)
+        write(summary, exported_arrays(replace(opened.load(key), scene=summary.scene), forces), file)
 
 
 def _units_of(document: str) -> Units:

@@ -68,13 +68,33 @@ def branch_arrays(branch: SteadyBranch) -> dict[str, NamedArray]:
     for prefix, points in parts.items():
         if not points:
             continue
-        over = f"{prefix}parameter"
         shapes = [point.state.shapes for point in points]
-        arrays[over] = NamedArray((over,), np.array([point.parameter for point in points]))
-        arrays[f"{prefix}tangent_angle"] = NamedArray(
-            (over, "vesicle", "point"), np.array([shape.tangent_angle for shape in shapes])
+        values = (
+            np.array([point.parameter for point in points]),
+            np.array([shape.tangent_angle for shape in shapes]),
+            np.array([shape.center for shape in shapes]),
         )
-        arrays[f"{prefix}center"] = NamedArray(
-            (over, "vesicle", "axis"), np.array([shape.center for shape in shapes])
-        )
+        for (name, dimensions), array in zip(branch_dimensions(prefix).items(), values, strict=True):
+            arrays[name] = NamedArray(dimensions, array)
     return arrays
+
+
+def branch_dimensions(prefix: str) -> dict[str, tuple[str, ...]]:
+    """Return the names of the arrays of a part of a branch, with their dimensions.
+
+    Parameters
+    ----------
+    prefix : str
+        ``fold_``, ``crossing_``, or empty for the points.
+
+    Returns
+    -------
+    dict of str to tuple of str
+        The parameter, the tangent angles and the centers.
+    """
+    over = f"{prefix}parameter"
+    return {
+        over: (over,),
+        f"{prefix}tangent_angle": (over, "vesicle", "point"),
+        f"{prefix}center": (over, "vesicle", "axis"),
+    }

@@ -3,29 +3,30 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from io import BytesIO
 from pathlib import Path
 
 import h5netcdf
 
 from ensemble.disk import flush, replacing
-from ensemble.store.run_record import RunSummary, arrays
-from solver.analysis.run import Run
+from ensemble.store.run_record import NamedArray, RunSummary
 
 
-def export_run(summary: RunSummary, run: Run, path: Path) -> None:
+def write_netcdf(summary: RunSummary, arrays: Mapping[str, NamedArray], path: Path) -> None:
     """Write a run to a new file, or replace the file in one step.
 
-    Each array is one variable, with the name and the dimensions that it has in the store, a description and
-    units; xarray opens the file with coordinates (``engine="h5netcdf"``).  Each field of the summary is one
-    attribute of the root, as JSON text, so that None, nested fields and every bit of a float are kept.
+    Each array is one variable, with a description and units, the stored ones with the names and dimensions
+    that they have in the store; xarray opens the file with coordinates (``engine="h5netcdf"``).  Each field
+    of the summary is one attribute of the root, as JSON text, so that None, nested fields and every bit of a
+    float are kept.
 
     Parameters
     ----------
     summary : RunSummary
         Everything about the run except its arrays.
-    run : Run
-        The run.
+    arrays : mapping of str to NamedArray
+        As `ensemble.store.exports.exported_arrays` returns them.
     path : Path
         The file to write.  It is durable when this function returns.
 
@@ -38,7 +39,7 @@ def export_run(summary: RunSummary, run: Run, path: Path) -> None:
     image = BytesIO()
     # Attributes beyond 64 KiB (a scene of many vesicles) need the 1.8 file format or later.
     with h5netcdf.File(image, "w", libver=("v108", "v110")) as file:
-        for name, array in arrays(run).items():
+        for name, array in arrays.items():
             for dimension, size in zip(array.dimensions, array.values.shape, strict=True):
                 if dimension not in file.dimensions:
                     file.dimensions[dimension] = size

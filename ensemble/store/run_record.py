@@ -204,11 +204,17 @@ FRAME_DIMENSIONS: Mapping[str, tuple[str, ...]] = {
     "tangent_angle": ("frame_time", "vesicle", "point"),
     "center": ("frame_time", "vesicle", "axis"),
     "tension": ("frame_time", "vesicle", "point"),
+    # What follows from these.
+    "x": ("frame_time", "vesicle", "point"),
+    "y": ("frame_time", "vesicle", "point"),
+    "bending_force": ("frame_time", "vesicle", "point", "axis"),
+    "tension_force": ("frame_time", "vesicle", "point", "axis"),
+    "adhesion_force": ("frame_time", "vesicle", "point", "axis"),
 }
 
 
 def arrays(run: Run) -> dict[str, NamedArray]:
-    """Return the arrays of a run by name: diagnostics over `time`, then the frames over `frame_time`.
+    """Return the arrays of a run that are stored: diagnostics over `time`, then the frames over `frame_time`.
 
     Parameters
     ----------
@@ -232,7 +238,7 @@ def named_arrays(parts: Mapping[str, Mapping[str, Rows]], units: Units | None) -
     Parameters
     ----------
     parts : mapping of str to mapping of str to Rows
-        The series, vesicle series and frames of a `Run`.
+        The series, vesicle series and frames of a `Run`; the frames with what follows from them, if wanted.
     units : Units or None
         Of its scene.
 

@@ -1,4 +1,4 @@
-"""What is recorded in a run: what each series measures, and in which unit."""
+"""What is recorded in a run, and what follows from it: what each array measures, and in which unit."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Final, NamedTuple
 from solver.dimensions import (
     ANGLE,
     ENERGY_PER_DEPTH,
+    FORCE_PER_AREA,
     LENGTH,
     NUMBER,
     RATE,
@@ -18,7 +19,7 @@ from solver.dimensions import (
 
 
 class Recorded(NamedTuple):
-    """A series of a run.
+    """An array of a run.
 
     Attributes
     ----------
@@ -30,13 +31,18 @@ class Recorded(NamedTuple):
     dimension: Dimension
 
 
-# By the names that the series have in `solver.analysis.run` and in files.
+# By the names that the arrays have in `solver.analysis.run` and in files.
 RECORDED: Final[Mapping[str, Recorded]] = {
     "time": Recorded("time of the diagnostics", TIME),
     "frame_time": Recorded("time of the recorded states", TIME),
     "tangent_angle": Recorded("tangent angle of the membranes, by equal arclength", ANGLE),
     "center": Recorded("centers of the membranes", LENGTH),
     "tension": Recorded("membrane tension", TENSION),
+    "x": Recorded("x of the points of the membranes", LENGTH),
+    "y": Recorded("y of the points of the membranes", LENGTH),
+    "bending_force": Recorded("force per area on the fluid by bending", FORCE_PER_AREA),
+    "tension_force": Recorded("force per area on the fluid by tension", FORCE_PER_AREA),
+    "adhesion_force": Recorded("force per area on the fluid by adhesion", FORCE_PER_AREA),
     "bending_energy": Recorded("bending energy of all vesicles", ENERGY_PER_DEPTH),
     "adhesion_energy": Recorded("adhesion energy of all pairs", ENERGY_PER_DEPTH),
     "area_error": Recorded("largest relative drift of a vesicle's area", NUMBER),

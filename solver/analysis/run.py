@@ -68,10 +68,14 @@ class Energy:
         ½κ∫curvature² ds over all vesicles.
     adhesion : float or None
         ∫∫φ ds ds over all pairs of vesicles; None without adhesion.
+    binding : float or None
+        The sum of both at equilibrium, less the bending energy of the same vesicles at rest, each alone.
+        Negative where to come together has paid.  None without adhesion, of other states and in old records.
     """
 
     bending: Annotated[float, ENERGY_PER_DEPTH]
     adhesion: Annotated[float | None, ENERGY_PER_DEPTH]
+    binding: Annotated[float | None, ENERGY_PER_DEPTH] = None
 
 
 LARGEST_SPATIAL = 1e-3

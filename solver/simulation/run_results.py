@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from solver.analysis import averages
-from solver.analysis.run import Energy, Outcome, RunResults, Work
+from solver.analysis.free_energy import energy_of
+from solver.analysis.run import Outcome, RunResults, Work
 from solver.simulation.run_errors import errors_of
 
 if TYPE_CHECKING:
@@ -54,10 +55,7 @@ def results_of(
         inclination_angle=averages.inclination(scene, sample, loop.tracker),
         gap=sample.get("gap"),
         viscosity=viscosity,
-        energy=Energy(
-            bending=sample["bending_energy"],
-            adhesion=sample.get("adhesion_energy"),
-        ),
+        energy=energy_of(scene, outcome, sample),
         error=errors_of(scene, loop, outcome, viscosity),
         sensitive=loop.answer_errors.sensitive,
         work=Work(

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from solver.analysis import averages
 from solver.analysis.criteria.steady import outcome_at_rest
 from solver.analysis.diagnostics import measures
-from solver.analysis.run import Energy, Outcome, Viscosity
+from solver.analysis.free_energy import energy_of
 from solver.analysis.spatial_error import shape_tails, spatial_error
 from solver.membrane.symmetry import has_images, independent_vesicles
 from solver.motion.terms import accurate_equation
@@ -23,6 +23,7 @@ from solver.steady_states.steady_equations import SteadyEquations, with_all_vesi
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from solver.analysis.run import Energy, Outcome, Viscosity
     from solver.scene import Scene
     from solver.steady_states.branch import BranchPoint
 
@@ -206,18 +207,16 @@ def _described(scene: Scene, equations: SteadyEquations, state: Array) -> Steady
     if len(scene.vesicles) == 2:
         offset = shapes.center[1] - shapes.center[0]
         sample["center_angle"] = float(np.arctan2(offset[1], offset[0]))
+    outcome = outcome_at_rest(scene, membranes, state)
     return SteadyState(
         scene=scene,
-        outcome=outcome_at_rest(scene, membranes, state),
+        outcome=outcome,
         stable=perturbations.stable,
         eigenvalues=perturbations.eigenvalues[:_KEPT_EIGENVALUES],
         inclination_angle=averages.inclination(scene, sample),
         gap=sample.get("gap"),
         viscosity=averages.steady_viscosity(sample),
-        energy=Energy(
-            bending=sample["bending_energy"],
-            adhesion=sample.get("adhesion_energy"),
-        ),
+        energy=energy_of(scene, outcome, sample),
         spatial_error=float(spatial_error(tails, age=np.full_like(tails, np.inf)).max()),
         shapes=shapes,
     )

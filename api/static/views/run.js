@@ -113,6 +113,7 @@ function heading({ key, outcome, time, scene, failure }) {
       ["gif", "movie"],
       ["svg", "figure"],
       ["h5", "HDF5"],
+      ["vtkhdf", "ParaView"],
     ]),
     failure ? element("p", { class: "alert" }, failure) : null,
   );
@@ -140,6 +141,7 @@ function results({ period, gap, inclination_angle, viscosity, energy, error, wor
       ["– viscosity contrast", orNull(viscosity?.contrast)],
       ["Bending energy", orNull(energy.bending)],
       ["Adhesion energy", orNull(energy.adhesion)],
+      ["Binding energy", orNull(energy.binding)],
       ["Position error", orNull(error.global)],
       ["Area error", number(error.area, 2)],
       ["Closure error", number(error.closure, 2)],

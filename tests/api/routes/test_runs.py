@@ -5,8 +5,10 @@ from __future__ import annotations
 import shutil
 import socket
 import tracemalloc
+from io import BytesIO
 from pathlib import Path
 
+import h5py
 import httpx2
 import numpy as np
 import pytest
@@ -48,6 +50,13 @@ def test_a_run_is_given_as_a_figure(reading, bound_run):
     assert answer.headers["content-disposition"] == f'attachment; filename="run-{bound_run[:8]}.png"'
     assert answer.content.startswith(b"\x89PNG")
     assert reading.get(f"/runs/{'0' * 32}/file?format=png").status_code == 404
+
+
+def test_a_run_is_given_for_paraview(reading, bound_run):
+    answer = reading.get(f"/runs/{bound_run}/file?format=vtkhdf")
+    assert answer.status_code == 200
+    with h5py.File(BytesIO(answer.content)) as file:
+        assert file["VTKHDF"].attrs["Type"] == b"PolyData"
 
 
 def found(client: httpx2.Client, **query: object) -> list[dict]:

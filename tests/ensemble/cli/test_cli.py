@@ -153,7 +153,7 @@ def test_run_prints_the_documented_fields(stored_run):
     assert document["failure"] is None
     assert document["inclination_angle"] is None, "a doublet has none"
     assert document["viscosity"].keys() == {"total", "bending_tension", "adhesion", "contrast"}
-    assert document["energy"].keys() == {"bending", "adhesion"}
+    assert document["energy"].keys() == {"bending", "adhesion", "binding"}
     assert document["error"].keys() == ERRORS
     parts = document["viscosity"]["bending_tension"] + document["viscosity"]["adhesion"]
     assert math.isclose(document["viscosity"]["total"], parts)
@@ -405,6 +405,22 @@ def test_export_writes_one_file(ensemble, stored_run, tmp_path):
     with h5py.File(file) as exported:
         assert json.loads(exported.attrs["key"]) == document["run_key"]
         assert exported["tangent_angle"].shape[1:] == (2, 32)
+        assert exported["x"].shape[1:] == (2, 32)
+        assert "bending_force" not in exported
+
+
+def test_export_writes_what_its_suffix_says(ensemble, stored_run, tmp_path):
+    file = tmp_path / "run.vtkhdf"
+    store, document = stored_run
+    key = document["run_key"]
+    assert ensemble("export", key, str(file), "--forces", f"--store={store}").returncode == 0
+    with h5py.File(file) as exported:
+        assert {"tension", "bending_force", "tension_force"} <= exported["VTKHDF/PointData"].keys()
+    refused = ensemble("export", key, str(tmp_path / "run.vtu"), f"--store={store}")
+    assert refused.returncode == 2
+    assert "run.vtu" in refused.stderr
+    assert ".vtkhdf" in refused.stderr
+    assert list(tmp_path.iterdir()) == [file]
 
 
 def test_check_finds_damage(ensemble, stored_run, tmp_path):

@@ -17,7 +17,8 @@ import numpy as np
 import pytest
 import xarray
 
-from ensemble.store.hdf5_export import export_run
+from ensemble.store.exports import exported_arrays
+from ensemble.store.hdf5_export import write_netcdf
 from ensemble.store.run_record import RunSummary, arrays
 from solver.analysis.run import Run
 from solver.scene import Vesicle
@@ -28,7 +29,8 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 import numpy as np
-from ensemble.store.hdf5_export import export_run
+from ensemble.store.exports import exported_arrays
+from ensemble.store.hdf5_export import write_netcdf
 from ensemble.store.run_record import RunSummary
 from tests.ensemble.runs import shear_run, shear_scene
 path, number = Path(sys.argv[1]), int(sys.argv[2])
@@ -37,7 +39,7 @@ while True:
     number += 1
     frames = replace(run.frames, tension=np.full_like(run.frames.tension, number))
     numbered = replace(run, time=float(number), frames=frames)
-    export_run(RunSummary.of(numbered), numbered, path)
+    write_netcdf(RunSummary.of(numbered), exported_arrays(numbered), path)
     print(number, flush=True)
 """
 
@@ -59,10 +61,10 @@ def is_bare_dimension(data: h5py.Dataset) -> bool:
 @pytest.mark.parametrize("run", [shear_run(), failed_run()], ids=["shear", "failed"])
 def test_export_holds_the_whole_run(tmp_path: Path, run: Run) -> None:
     summary = RunSummary.of(run)
-    export_run(summary, run, tmp_path / "run.h5")
+    write_netcdf(summary, exported_arrays(run), tmp_path / "run.h5")
     values, attributes = read(tmp_path / "run.h5")
     assert RunSummary.model_validate(attributes).document() == summary.document()
-    assert values.keys() == arrays(run).keys()
+    assert values.keys() == arrays(run).keys() | {"x", "y"}
     for name, array in arrays(run).items():
         assert (values[name].dtype, values[name].shape) == (array.values.dtype, array.values.shape)
         assert values[name].tobytes() == array.values.tobytes()
@@ -71,7 +73,7 @@ def test_export_holds_the_whole_run(tmp_path: Path, run: Run) -> None:
 def test_the_attributes_of_many_vesicles_exceed_64_kib(tmp_path: Path) -> None:
     vesicles = tuple(Vesicle(center=(3.0 * number, 0.0)) for number in range(600))
     run = shear_run(shear_scene().model_copy(update={"vesicles": vesicles}), frames=1)
-    export_run(RunSummary.of(run), run, tmp_path / "run.h5")
+    write_netcdf(RunSummary.of(run), exported_arrays(run), tmp_path / "run.h5")
     with h5py.File(tmp_path / "run.h5") as file:
         assert len(file.attrs["scene"]) > 1 << 16
     assert read(tmp_path / "run.h5")[1]["scene"] == run.scene.model_dump(mode="json")
@@ -79,7 +81,7 @@ def test_the_attributes_of_many_vesicles_exceed_64_kib(tmp_path: Path) -> None:
 
 def test_export_is_readable_without_this_package(tmp_path: Path) -> None:
     run = shear_run()
-    export_run(RunSummary.of(run), run, tmp_path / "run.h5")
+    write_netcdf(RunSummary.of(run), exported_arrays(run), tmp_path / "run.h5")
     with h5py.File(tmp_path / "run.h5") as file:
         assert file.attrs["outcome"] == '"bound"'
         assert file["tangent_angle"].shape == run.frames.tangent_angle.shape
@@ -87,11 +89,11 @@ def test_export_is_readable_without_this_package(tmp_path: Path) -> None:
 
 def test_failed_export_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:
     run, path = shear_run(), tmp_path / "run.h5"
-    export_run(RunSummary.of(run), run, path)
+    write_netcdf(RunSummary.of(run), exported_arrays(run), path)
     before = path.read_bytes()
     unwritable = replace(run, series=run.series | {"gap": np.array([object()] * len(run.series["gap"]))})
     with pytest.raises(TypeError):
-        export_run(RunSummary.of(run), unwritable, path)
+        write_netcdf(RunSummary.of(run), exported_arrays(unwritable), path)
     assert path.read_bytes() == before
     assert list(tmp_path.iterdir()) == [path]
 
@@ -126,9 +128,9 @@ def test_file_is_whole_whenever_its_writer_is_killed(tmp_path: Path) -> None:
 
 def test_xarray_opens_an_export_with_names_coordinates_and_units_and_writes_it_again(tmp_path: Path) -> None:
     run = shear_run()
-    export_run(RunSummary.of(run), run, tmp_path / "run.h5")
+    write_netcdf(RunSummary.of(run), exported_arrays(run), tmp_path / "run.h5")
     with xarray.open_dataset(tmp_path / "run.h5", engine="h5netcdf") as data:
-        assert set(data.coords) == {"time", "frame_time"}
+        assert set(data.coords) == {"time", "frame_time", "x", "y"}
         assert data["gap"].dims == ("time",)
         assert data["tangent_angle"].dims == ("frame_time", "vesicle", "point")
         assert all(variable.attrs.keys() >= {"long_name", "units"} for variable in data.variables.values())
