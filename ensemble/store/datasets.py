@@ -1,4 +1,4 @@
-"""What a store holds as data sets of xarray.
+"""Runs and branches of a store as data sets of xarray.
 
 Arrays of runs are read when they are used, and no file stays open in between.
 """
@@ -15,7 +15,6 @@ from xarray import Dataset, Variable
 from xarray.backends import BackendArray
 from xarray.core import indexing
 
-from ensemble.search.boundary import Boundary
 from ensemble.search.branch_summary import BranchSummary
 from ensemble.store.branch_record import branch_dimensions
 from ensemble.store.branch_shelf import BRANCHES
@@ -129,38 +128,6 @@ def _points(directory: Path, lengths: Array, component: int, rows: range) -> Arr
     group = StoredGroup(directory, "run")
     points = positions(group.rows("tangent_angle", rows), group.rows("center", rows), lengths)
     return points[:, :, component]
-
-
-def boundary_dataset(boundary: Boundary) -> Dataset:
-    """Return the points of a boundary.
-
-    Parameters
-    ----------
-    boundary : Boundary
-
-    Returns
-    -------
-    Dataset
-        Over ``point``, in their order, with the swept parameters as coordinates.  Numbers that are not known
-        are NaN, outcomes empty.
-    """
-    points = boundary.points
-    swept = points[0].parameters if points else {}
-    sides = [[np.nan if end is None else end for end in point.bracket] for point in points]
-    critical = [np.nan if point.critical_value is None else point.critical_value for point in points]
-    outcomes = [[outcome or "" for outcome in point.outcomes] for point in points]
-    return Dataset(
-        {
-            "critical_value": ("point", critical),
-            "bracket": (("point", "side"), np.reshape(sides, (-1, 2))),
-            "outcome": (("point", "side"), np.reshape(np.array(outcomes, dtype=str), (-1, 2))),
-            "status": ("point", np.array([point.status for point in points], dtype=str)),
-            "certified": ("point", [point.certified for point in points]),
-        },
-        coords={path: ("point", [point.parameters[path] for point in points]) for path in swept}
-        | {"side": ["low", "high"]},
-        attrs={"name": boundary.name, "study_key": boundary.study_key},
-    )
 
 
 def branch_dataset(store: Path, summary: BranchSummary) -> Dataset:

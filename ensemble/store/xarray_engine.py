@@ -16,7 +16,8 @@ from xarray.backends import BackendEntrypoint
 
 from ensemble.errors import StoreError
 from ensemble.search.branch_summary import BranchSummary
-from ensemble.store.datasets import boundary_dataset, branch_dataset, run_dataset
+from ensemble.store.boundary_arrays import boundary_dataset
+from ensemble.store.datasets import branch_dataset, run_dataset
 from ensemble.store.store import Store
 from ensemble.store.store_directory import exists
 
