@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 _COLUMNS = {
     "run": "key",
     "outcome": "outcome",
+    "configuration": "configuration",
     "flow": "flow.kind",
     "rate": "flow.rate",
     "hamaker": "adhesion.hamaker",
@@ -40,6 +41,7 @@ _COLUMNS = {
 _WORK = ("points", "steps", "rejected_steps", "rhs_evaluations", "wall_seconds")
 _RESULTS = (
     "outcome",
+    "configuration",
     "failure",
     "undecided",
     "time",
@@ -52,6 +54,7 @@ _RESULTS = (
     "gap",
     "viscosity",
     "energy",
+    "arrangement",
     "error",
 )
 

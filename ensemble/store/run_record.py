@@ -18,7 +18,9 @@ from ensemble.config.run_key import DISTRIBUTION, run_key
 from ensemble.timestamp import Timestamp, now
 from solver.analysis.recorded import RECORDED
 from solver.analysis.run import (
+    Arrangement,
     Array,
+    Configuration,
     Energy,
     Errors,
     Frames,
@@ -66,6 +68,7 @@ class RunSummary(BaseModel):
     results_revision: int | None = None
     scene: Scene
     outcome: Outcome
+    configuration: Configuration | None = None
     failure: str | None
     undecided: str | None = None
     time: Annotated[float, TIME]
@@ -82,6 +85,7 @@ class RunSummary(BaseModel):
     series: tuple[str, ...]
     vesicle_series: tuple[str, ...] = ()
     perturbations: tuple[Annotated[float, TIME], ...] = ()
+    arrangement: Arrangement | None = None
     report: str | None = None
 
     def in_units(self, units: Units | None) -> Self:

@@ -1,4 +1,4 @@
-"""The line of centers of two vesicles: its length, its half turns, and how far it opens in each."""
+"""The line of centers of two vesicles: its length, its half turns, how far it opens, what turns with it."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.analysis.revolutions import CountedDirection, RevolutionTracker, crossing, greatest
+from solver.analysis.revolutions import CountedDirection, RevolutionTracker, crossing, extremes
 from solver.analysis.settling import KEPT_HALF_TURNS
+from solver.membrane import curve
 
 if TYPE_CHECKING:
     from solver.integrators import Step
@@ -20,6 +21,8 @@ Array = NDArray[np.float64]
 
 # A pair may start beyond the separated distance.  Then it has to move farther apart by this factor.
 _FARTHER = 1.5
+
+_IN_A_TURN = 2  # half turns
 
 
 class LineOfCenters(RevolutionTracker):
@@ -40,6 +43,10 @@ class LineOfCenters(RevolutionTracker):
         At the end of the last step.
     openings : list of float
         The largest distance in each of the last half turns from one passage to the next, continuous in time.
+    closest : list of float
+        The smallest one, likewise.
+    own_angles : list of (M,)
+        Angles of the vesicles' long axes at the last passages, radians, unwrapped.
     separated : bool
         Whether the distance has passed the separated distance, or 1.5 times that at the start if that is
         more.
@@ -54,13 +61,18 @@ class LineOfCenters(RevolutionTracker):
         "separated_distance",
         "separated",
         "openings",
+        "closest",
+        "own_angles",
         "_opening",
+        "_closest",
+        "_own_angle",
     )
 
     def __init__(
         self, membranes: Membranes, state: Array, counted: CountedDirection, separated_distance: float
     ) -> None:
         super().__init__(membranes, state, counted)
+        self._own_angle = self._own_directions(state)
         self.distance = self.distance_of(state)
         self.separated_distance = max(separated_distance, _FARTHER * self.distance)
         self.separated = False
@@ -69,7 +81,9 @@ class LineOfCenters(RevolutionTracker):
         """Count passages, and take openings, from the end of the last step on."""
         super().count_from_here()
         self.openings: list[float] = []
-        self._opening = 0.0  # in the half turn that has not ended
+        self.closest: list[float] = []
+        self.own_angles: list[Array] = []
+        self._opening, self._closest = 0.0, math.inf  # in the half turn that has not ended
 
     def advance(self, step: Step) -> Step:
         """Follow one step, but no farther than to separation.
@@ -89,12 +103,28 @@ class LineOfCenters(RevolutionTracker):
         step = super().advance(step)
         self.distance = self.distance_of(step.state)
         self._follow_opening(step)
+        self._follow_axes(step)
         return step
 
     @property
     def cycle(self) -> Array:
         """What characterizes each of the last half turns, (n, 2): logarithms of its duration and opening."""
         return np.column_stack([super().cycle, np.log(self.openings)])
+
+    @property
+    def opening(self) -> float | None:
+        """Largest over smallest distance in the last full turn; None before the first one."""
+        if len(self.openings) < _IN_A_TURN:
+            return None
+        return max(self.openings[-_IN_A_TURN:]) / min(self.closest[-_IN_A_TURN:])
+
+    @property
+    def own_turns(self) -> list[float] | None:
+        """How often each long axis revolved in the last full turn, in its sense; None before the first one."""
+        if self.half_turns < _IN_A_TURN:
+            return None
+        turned = self.own_angles[-1] - self.own_angles[-1 - _IN_A_TURN]
+        return list(self._counted.sense * turned / (2 * np.pi))
 
     def _follow_opening(self, step: Step) -> None:
         """Take in the distances of a step."""
@@ -103,12 +133,34 @@ class LineOfCenters(RevolutionTracker):
         for index, (first, last) in enumerate(pairwise(times)):
             if index > 0:
                 self._end_half_turn(known + index - 1)
-            self._opening = max(self._opening, greatest(step, self.distance_of, first, last))
+            least, most = extremes(step, self.distance_of, first, last)
+            self._opening, self._closest = max(self._opening, most), min(self._closest, least)
 
     def _end_half_turn(self, passage: int) -> None:
         if passage > 0:  # before the first passage there is no half turn
             self.openings = [*self.openings, self._opening][-KEPT_HALF_TURNS:]
-        self._opening = 0.0
+            self.closest = [*self.closest, self._closest][-_IN_A_TURN:]
+        self._opening, self._closest = 0.0, math.inf
+
+    def _follow_axes(self, step: Step) -> None:
+        """Unwrap the angles of the vesicles' long axes at times within a step, and keep those at passages."""
+        angles = [self._own_angle]
+        for state in self._states[1:]:
+            angles.append(self._unwrapped_axes(state, angles[-1]))
+        for time in self.latest:
+            near = np.array([np.interp(time, self._times, own) for own in np.transpose(angles)])
+            at_passage = self._unwrapped_axes(step.interpolate(time), near)
+            self.own_angles = [*self.own_angles, at_passage][-_IN_A_TURN - 1 :]
+        self._own_angle = angles[-1]
+
+    def _unwrapped_axes(self, state: Array, near: Array) -> Array:
+        angles = self._own_directions(state)
+        return np.asarray(angles + np.pi * np.round((near - angles) / np.pi))
+
+    def _own_directions(self, state: Array) -> Array:
+        membranes = self.membranes
+        angle, center = membranes.tangent_angle(state), membranes.center(state)
+        return curve.inclination(curve.positions(angle, center, membranes.length))
 
     def distance_of(self, state: Array) -> float:
         """Return the center distance in a state.

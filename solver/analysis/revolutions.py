@@ -121,6 +121,7 @@ class RevolutionTracker(Remembering, ABC):
     def _stand(self) -> None:
         """Take the angle as that of any time: no step has been followed."""
         self._times, self._angles = np.zeros(1), np.array([self.angle])
+        self._states: list[Array] = []  # at these times
 
     def count_from_here(self) -> None:
         """Count passages from the end of the last step on: what was before is no part of the motion now."""
@@ -215,7 +216,8 @@ class RevolutionTracker(Remembering, ABC):
         """Unwrap the angle at times within a step between which no tangent turns far."""
         tangent_angle = self.membranes.tangent_angle
         times, angles, to_come = [step.start], [self.angle], [step.end]
-        tangents = tangent_angle(step.interpolate(step.start))
+        states = [step.interpolate(step.start)]
+        tangents = tangent_angle(states[0])
         while to_come:
             time = to_come[-1]
             state = step.state if time == step.end else step.interpolate(time)
@@ -225,8 +227,9 @@ class RevolutionTracker(Remembering, ABC):
                 continue
             times.append(to_come.pop())
             angles.append(self._unwrapped(state, angles[-1]))
+            states.append(state)
             tangents = turned
-        self._times, self._angles = np.array(times), np.array(angles)
+        self._times, self._angles, self._states = np.array(times), np.array(angles), states
         self.angle = angles[-1]
 
     def _unwrapped(self, state: Array, near: float) -> float:
@@ -261,10 +264,12 @@ def may_tumble(scene: Scene) -> bool:
     return len(scene.vesicles) == 1 and rotates and scene.vesicles[0].reduced_area < 1
 
 
-def greatest(step: Step, quantity: Callable[[Array], float], first: float, last: float) -> float:
-    """Return the maximum of a smooth quantity over a part of a step.
+def extremes(
+    step: Step, quantity: Callable[[Array], float], first: float, last: float
+) -> tuple[float, float]:
+    """Return the minimum and the maximum of a smooth quantity over a part of a step.
 
-    It is that of the polynomial of degree 4 through five values: no less accurate than the step.
+    They are those of the polynomial of degree 4 through five values: no less accurate than the step.
 
     Parameters
     ----------
@@ -276,10 +281,15 @@ def greatest(step: Step, quantity: Callable[[Array], float], first: float, last:
 
     Returns
     -------
-    float
+    (float, float)
     """
     times = 0.5 * (first + last) + 0.5 * (last - first) * _NODES
     values = np.array([quantity(step.interpolate(time)) for time in times])
+    return -_greatest(-values), _greatest(values)
+
+
+def _greatest(values: Array) -> float:
+    """Return the maximum of the polynomial through values at the nodes."""
     if np.argmax(values) in (0, _NODES.size - 1):
         return float(values.max())
     polynomial = Polynomial(_COEFFICIENTS @ values)

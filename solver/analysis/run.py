@@ -33,6 +33,38 @@ class Outcome(StrEnum):
     FAILED = "failed"
 
 
+class Configuration(StrEnum):
+    """How two vesicles that stay together move or touch; see `solver.analysis.configurations`."""
+
+    SLIDING = "sliding"
+    ROLLING = "rolling"
+    TUMBLING = "tumbling"
+    FLAT = "flat"
+    MALE_FEMALE = "male-female"
+    SIGMOID = "sigmoid"
+
+
+@dataclass(frozen=True)
+class Arrangement:
+    """What tells configurations apart: of a pair whose motion has settled, or that has come to rest.
+
+    Attributes
+    ----------
+    opening : float or None
+        Largest over smallest distance of the centers in the last full turn; None at rest.
+    own_turns : tuple of float or None
+        Revolutions of each vesicle's long axis while the pair makes one; None at rest and for circles.
+    bow, twist : float or None
+        How far the middle between the membranes departs from a straight line where they are in contact, like
+        a bow and like an S, over the length of the contact; None in motion and without contact.
+    """
+
+    opening: float | None = None
+    own_turns: tuple[float, ...] | None = None
+    bow: float | None = None
+    twist: float | None = None
+
+
 @dataclass(frozen=True)
 class Viscosity:
     """Intrinsic viscosity [μ] = −∫ f_x y ds/(rate·area) by force, averaged over time.
@@ -224,6 +256,10 @@ class RunResults:
         with three times the estimated error.
     perturbations : tuple of float
         Times at which the run rested in an unstable state and was perturbed.
+    configuration : Configuration or None
+        None where none is known: of pairs that have not settled, other numbers of vesicles, in old records.
+    arrangement : Arrangement or None
+        What it is read from.
     """
 
     scene: Scene
@@ -242,6 +278,8 @@ class RunResults:
     sensitive: bool = False
     settled: bool | None = None
     undecided: str | None = None
+    configuration: Configuration | None = None
+    arrangement: Arrangement | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,7 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from solver.analysis import averages
+from solver.analysis.configurations import arrangement_of, configuration_of
 from solver.analysis.free_energy import energy_of
+from solver.analysis.line_of_centers import LineOfCenters
 from solver.analysis.run import Outcome, RunResults, Work
 from solver.simulation.run_errors import errors_of
 
@@ -42,7 +44,9 @@ def results_of(
     rotates = flow is not None and flow.rotates and loop.time > scene.constant_from
     period = loop.tracker.period if loop.tracker and rotates else None
     viscosity = averages.viscosity(scene, sample, outcome, loop.tracker, loop.viscosities)
-    done = loop.segment.work
+    done, membranes = loop.segment.work, loop.segment.membranes
+    line = loop.tracker if isinstance(loop.tracker, LineOfCenters) else None
+    arrangement = arrangement_of(scene, outcome, line, membranes, loop.state[: membranes.state_size])
     return RunResults(
         scene=scene,
         outcome=outcome,
@@ -67,7 +71,9 @@ def results_of(
             tension_iterations=done.tension_iterations,
             wall_seconds=wall_seconds,
             smallest_step=loop.smallest_step,
-            points=loop.segment.membranes.points,
+            points=membranes.points,
         ),
         perturbations=tuple(loop.perturbations),
+        configuration=configuration_of(arrangement),
+        arrangement=arrangement,
     )

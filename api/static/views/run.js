@@ -120,7 +120,7 @@ function heading({ key, outcome, time, scene, failure }) {
 }
 
 /** @param {any} run */
-function results({ period, gap, inclination_angle, viscosity, energy, error, work }) {
+function results({ configuration, period, gap, inclination_angle, viscosity, energy, arrangement, error, work }) {
   /** @type {(value: any, error: any) => string | null} */
   const withError = (value, error) => {
     if (value === null || value === undefined) return null;
@@ -132,7 +132,12 @@ function results({ period, gap, inclination_angle, viscosity, energy, error, wor
     { class: "results" },
     element("h2", {}, "Results"),
     definitions([
+      ["Configuration", configuration ?? null],
       ["Period", withError(period, error.period)],
+      ["Slides open by a factor", orNull(arrangement?.opening)],
+      ["Own turns in a turn", arrangement?.own_turns?.map((/** @type {number} */ own) => number(own)).join(", ") ?? null],
+      ["Bow of the contact", orNull(arrangement?.bow)],
+      ["Twist of the contact", orNull(arrangement?.twist)],
       ["Gap", orNull(gap)],
       ["Inclination", inclination_angle === null ? null : `${withError(inclination_angle, error.inclination_angle)}°`],
       ["Viscosity [μ]", withError(viscosity?.total, error.viscosity)],

@@ -25,6 +25,8 @@ INDICATORS = {"area", "closure", "temporal", "spatial"}
 ERRORS = INDICATORS | {"global", "period", "inclination_angle", "viscosity", "time"}
 RUN_FIELDS = {
     "outcome",
+    "configuration",
+    "arrangement",
     "failure",
     "undecided",
     "time",
