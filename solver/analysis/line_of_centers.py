@@ -120,7 +120,7 @@ class LineOfCenters(RevolutionTracker):
 
     @property
     def own_turns(self) -> list[float] | None:
-        """How often each long axis revolved in the last full turn, in its sense; None before the first one."""
+        """How often each long axis revolved in the last full turn, in its sense; None before the first."""
         if self.half_turns < _IN_A_TURN:
             return None
         turned = self.own_angles[-1] - self.own_angles[-1 - _IN_A_TURN]
