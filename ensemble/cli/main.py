@@ -89,7 +89,7 @@ def main() -> None:
     """Run the command line.
 
     Bad input ends it with status 2, and trouble with the machine or the store with status 1; each with one
-    line.
+    line; without one if nobody reads the output any more.
     """
     pin_threads()
     for stream in (sys.stdout, sys.stderr):
@@ -104,6 +104,8 @@ def main() -> None:
         except BadInput as error:
             print(f"ensemble: {error}", file=sys.stderr)
             sys.exit(2)
+        except BrokenPipeError:  # whoever read the output has seen enough, such as head
+            sys.exit(1)
         except Exception as error:
             line = told_in_a_line(error)
             if line is None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Iterable, Mapping, Sequence
 from textwrap import indent
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -11,7 +10,6 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import typer
 
 if TYPE_CHECKING:
-    from rich.console import RenderableType
     from rich.table import Table
 
     from ensemble.questions import Answer
@@ -54,10 +52,13 @@ def print_list(columns: Sequence[ListColumn], documents: Iterable[Mapping[str, A
     documents : iterable of mapping
         The records, which are read as they are printed.
     """
+    from rich.console import Console
+
     from ensemble.display.result_tables import list_cell, list_table
 
-    if sys.stdout.isatty():
-        print_table(list_table(columns, documents))
+    console = Console()
+    if console.is_terminal:
+        console.print(list_table(columns, documents))
         return
     print("\t".join(column.heading for column in columns))
     for document in documents:
@@ -67,6 +68,8 @@ def print_list(columns: Sequence[ListColumn], documents: Iterable[Mapping[str, A
 def print_table(table: Table) -> None:
     """Print a table as wide as the terminal, or elsewhere as tab-separated values, whole ones.
 
+    A launcher hides whether there is a terminal: its users get the table.
+
     Parameters
     ----------
     table : Table
@@ -74,15 +77,18 @@ def print_table(table: Table) -> None:
     """
     from rich.console import Console
 
+    from ensemble.display.result_tables import for_people, plain
+    from ensemble.mpi.world import is_launched
+
     console = Console()
-    if console.is_terminal:
-        console.print(table)
+    if console.is_terminal or is_launched():
+        console.print(for_people(table))
         return
     columns = table.columns
     if table.show_header:
-        print("\t".join(_text(column.header) for column in columns))
+        print("\t".join(plain(column.header) for column in columns))
     for row in zip(*(column.cells for column in columns), strict=True):
-        print("\t".join(map(_text, row)))
+        print("\t".join(map(plain, row)))
 
 
 def print_answer(answer: Answer, as_json: bool) -> NoReturn:
@@ -106,9 +112,3 @@ def print_answer(answer: Answer, as_json: bool) -> NoReturn:
         if answer.footer is not None:
             print(answer.footer)
     raise typer.Exit(answer.status)
-
-
-def _text(cell: RenderableType) -> str:
-    from rich.text import Text
-
-    return Text.from_markup(cell).plain if isinstance(cell, str) else str(cell)

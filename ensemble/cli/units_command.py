@@ -27,6 +27,7 @@ def units(  # numpydoc ignore=PR01
 
     from ensemble.config.documents import read_document
     from ensemble.config.overrides import parse_override
+    from ensemble.display.result_tables import list_cell
     from ensemble.questions import kind_of
 
     with refusing():
@@ -37,13 +38,13 @@ def units(  # numpydoc ignore=PR01
         return
     table = Table("quantity", "in units of the scene", "with its unit")
     for row in rows:
-        table.add_row(row["name"], f"{row['in_scene']}", f"{row['value']:.6g} {row['unit']}")
+        table.add_row(row["name"], list_cell(row["in_scene"]), f"{list_cell(row['value'])} {row['unit']}")
     print_table(table)
 
 
 def _rows(scene: Scene) -> list[dict[str, Any]]:
     """Return one unit of each dimension, then the numbers of the scene, then what H means."""
-    from ensemble.config.dotted_paths import number_at
+    from ensemble.config.dotted_paths import locations, value_at
     from ensemble.config.measured import Measured, measured_fields, units_of
     from solver.dimensions import ADHESION_ENERGY, LENGTH
 
@@ -55,8 +56,8 @@ def _rows(scene: Scene) -> list[dict[str, Any]]:
     rows = [_row(each.name, each.unit, each.one) for each in units_of(units)]
     document = scene.model_dump(mode="json", exclude_none=True)
     for path, measured in measured_fields(scene, document, units).items():
-        if not isinstance(measured.value, list):
-            rows.append(_row(path, number_at(document, path), measured))
+        (location,) = locations(document, path)
+        rows.append(_row(path, value_at(document, location), measured))
     if scene.adhesion is not None:
         flat = scene.adhesion.flat_membranes
         energy = scene.adhesion.hamaker * flat.energy
@@ -67,5 +68,5 @@ def _rows(scene: Scene) -> list[dict[str, Any]]:
     return rows
 
 
-def _row(name: str, in_scene: float | str, measured: Measured) -> dict[str, Any]:
+def _row(name: str, in_scene: Any, measured: Measured) -> dict[str, Any]:
     return {"name": name, "in_scene": in_scene} | measured._asdict()

@@ -17,6 +17,9 @@ from solver.scene import Units
 Validated = TypeVar("Validated")
 SomeModel = TypeVar("SomeModel", bound=BaseModel)
 
+# What pydantic says in words of Python.
+_WORDS = {"tuple_type": "must be a list, such as [0.5, 1.0]"}
+
 
 @overload
 def validated(
@@ -85,7 +88,8 @@ def _suggestions(error: ValidationError, model: type[BaseModel] | TypeAdapter[An
     schema = model.json_schema() if isinstance(model, TypeAdapter) else model.model_json_schema()
     tables = [schema, *schema.get("$defs", {}).values()]
     names = {name for table in tables for name in table.get("properties", {})}
-    mistyped = [each for each in unknown if each not in names]  # the others belong to another table
+    # Those that exist belong to another table; one may be mistyped in several vesicles.
+    mistyped = [each for each in dict.fromkeys(unknown) if each not in names]
     similar = [name for name in (nearest(each, sorted(names)) for each in mistyped) if name is not None]
     return f" (did you mean {' and '.join(map(repr, similar))}?)" if similar else ""
 
@@ -130,7 +134,7 @@ def describe(problems: Sequence[ErrorDetails], document: Mapping[str, Any]) -> s
     messages: dict[str, list[str]] = {}
     for problem in problems:
         if problem["loc"] not in enclosing:
-            message = problem["msg"].removeprefix("Value error, ")
+            message = _WORDS.get(problem["type"], problem["msg"]).removeprefix("Value error, ")
             about_subject = messages.setdefault(_subject(problem, document), [])
             about_subject.append(message[:1].lower() + message[1:])
     return "; ".join(subject + ", or ".join(texts) for subject, texts in messages.items())

@@ -61,7 +61,7 @@ class _Lines(logging.Handler):
         if now < self._next:
             return
         self._next = now + REPEAT_SECONDS
-        text = "compiling, once on this machine"
+        text = "compiling what this scene needs, once on this machine"
         if self._functions > 1:
             text += f": {self._functions} functions in {now - self._begin:.0f} s so far"
         if self._for_program:

@@ -13,15 +13,25 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console, Group
 from rich.live import Live
+from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 from rich.text import Text
 
 from ensemble.display.compilation_lines import compilation_shown
 from ensemble.display.progress_line import ProgressLine
-from ensemble.display.result_tables import boundary_cells, boundary_columns, bracket_text, place_text
+from ensemble.display.result_tables import (
+    boundary_cells,
+    boundary_columns,
+    bracket_text,
+    for_people,
+    place_text,
+)
+from ensemble.mpi.world import telling
 
 if TYPE_CHECKING:
+    from rich.console import RenderableType
+
     from ensemble.mpi.dispatcher import JobProgress
     from ensemble.mpi.run_study import Snapshot
 
@@ -61,7 +71,7 @@ def job_progress(console: Console) -> Iterator[Callable[[JobProgress[Any]], None
         Takes the progress of the job.
     """
     if console.is_terminal:
-        with Live(console=console) as live:
+        with _live(console) as live:
             yield lambda progress: live.update(Text(progress_text(progress)))
     else:
         yield lambda progress: console.print(progress_text(progress), soft_wrap=True, highlight=False)
@@ -106,7 +116,7 @@ def study_progress(console: Console) -> Iterator[Callable[[Snapshot], None]]:
         Takes the latest snapshot of the study.
     """
     if console.is_terminal:
-        with Live(console=console) as live:
+        with _live(console) as live:
             yield lambda snapshot: live.update(
                 Group(_table(snapshot), Text(progress_text(snapshot.progress)))
             )
@@ -161,7 +171,10 @@ def run_progress(console: Console) -> Iterator[Callable[[float, float], None]]:
     callable
         Takes the time that the simulation has reached and its latest end.
     """
-    with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
+    if not console.is_terminal:
+        yield lambda time, end: None
+        return
+    with Progress(console=console, transient=True) as progress, told_above(console):
         bar = progress.add_task("simulating")
         yield lambda time, end: progress.update(bar, completed=time, total=end)
 
@@ -183,6 +196,29 @@ def progress_text(progress: JobProgress[Any]) -> str:
         f"{progress.runs} runs{known}, {len(progress.running)} running, "
         f"{_duration(progress.elapsed)} elapsed, {_time_left(progress)}"
     )
+
+
+@contextmanager
+def told_above(console: Console) -> Iterator[None]:
+    """Show what is told within the block above a live display of the console, which would cover it.
+
+    Parameters
+    ----------
+    console : Console
+
+    Yields
+    ------
+    None
+    """
+    with telling(lambda line: console.print(line, highlight=False, markup=False)):
+        yield
+
+
+@contextmanager
+def _live(console: Console) -> Iterator[Live]:
+    # Transient: what was found is printed afterwards.
+    with Live(console=console, transient=True) as live, told_above(console):
+        yield live
 
 
 @contextmanager
@@ -209,20 +245,20 @@ def report_progress(console: Console) -> Iterator[Callable[[str], None]]:
         if not console.is_terminal:
             yield lambda line: console.print(line, soft_wrap=True, highlight=False, markup=False)
             return
-        with Progress(*columns, console=console, transient=True) as progress:
+        with Progress(*columns, console=console, transient=True) as progress, told_above(console):
             task = progress.add_task("", total=None)
             yield lambda line: progress.update(task, description=line)
 
 
-def _table(snapshot: Snapshot) -> Table:
+def _table(snapshot: Snapshot) -> RenderableType:
     points = snapshot.boundary.points
     columns = boundary_columns(points)
-    table = Table(*columns, "running")
+    table = Table(*columns, "running", title=escape(snapshot.boundary.name))
     for point in points:
         at = snapshot.boundary.place(point)
         values = sorted(task.value for task in snapshot.progress.running.values() if task.at == at)
         table.add_row(*boundary_cells(point, columns), ", ".join(f"{value:.6g}" for value in values))
-    return table
+    return for_people(table)
 
 
 def _time_left(progress: JobProgress[Any]) -> str:
@@ -243,7 +279,10 @@ def _print_line(console: Console, progress: JobProgress[Any], message: str) -> N
 
 
 class _ChangedPoints:
-    """Says which brackets or statuses have changed, with the progress of the whole study."""
+    """Says which brackets or statuses have changed, with the progress of the whole study.
+
+    A line fits into 80 columns if the names of the parameters are short.
+    """
 
     def __init__(self) -> None:
         self._shown: dict[tuple[float, ...], str] = {}
@@ -251,10 +290,12 @@ class _ChangedPoints:
     def since_the_last(self, snapshot: Snapshot) -> list[str]:
         """Return a line for each point that has changed since the last snapshot."""
         lines = []
+        progress = snapshot.progress
+        left = "" if progress.seconds_left is None else f", about {_duration(progress.seconds_left)} left"
         for point in snapshot.boundary.points:
             at = snapshot.boundary.place(point)
             line = f"{place_text(point.parameters)}: {bracket_text(point)} {point.status}"
             if point.runs and line != self._shown.get(at):
                 self._shown[at] = line
-                lines.append(f"{line} ({progress_text(snapshot.progress)})")
+                lines.append(f"{_duration(progress.elapsed)} {line}; {progress.runs} runs{left}")
         return lines

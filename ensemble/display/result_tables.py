@@ -5,15 +5,23 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from rich import box
+from rich.console import Group
 from rich.markup import escape
 from rich.table import Column, Table
+from rich.text import Text
 
 if TYPE_CHECKING:
+    from rich.console import RenderableType
+
     from ensemble.config.measured import Measured
     from ensemble.search.boundary import Boundary, BoundaryPoint, OutcomeChange
     from ensemble.store.columns import ListColumn
 
 _ABSENT = "–"
+_WHOLE_CELL = 20  # a cell of so many characters is not divided, a longer one between words
+# A terminal may have 80 columns.
+_LEAN: dict[str, Any] = {"box": box.SIMPLE_HEAD, "pad_edge": False, "padding": (0, 1, 0, 0)}
 
 
 def boundary_columns(points: Sequence[BoundaryPoint]) -> list[str]:
@@ -101,7 +109,7 @@ def _change(change: OutcomeChange) -> str:
 def _scanned(point: BoundaryPoint) -> str:
     """Say how many values were looked at beside the brackets, and how wide an unseen window may be."""
     scanned = point.scanned
-    return _ABSENT if scanned is None else f"{scanned.values} values, unseen ≤ ×{scanned.widest_unseen:.3g}"
+    return _ABSENT if scanned is None else f"{scanned.values}, unseen ≤ ×{scanned.widest_unseen:.3g}"
 
 
 def _confirmed(point: BoundaryPoint) -> str:
@@ -130,7 +138,7 @@ def boundary_table(boundary: Boundary) -> Table:
     columns, measured = boundary_columns(boundary.points), boundary.measured()
     units = {name.replace("_", " "): each.unit for of_point in measured for name, each in of_point.items()}
     headings = [*columns, *(f"{name} ({unit})" for name, unit in units.items())]
-    table = Table(*map(_folded, headings), title=escape(boundary.name))
+    table = Table(*map(_folded, headings), title=escape(boundary.name), **_LEAN)
     for point, of_point in zip(boundary.points, measured, strict=True):
         values = {name.replace("_", " "): each.value for name, each in of_point.items()}
         table.add_row(*boundary_cells(point, columns), *(_range(values.get(name)) for name in units))
@@ -155,13 +163,67 @@ def fields_table(document: Mapping[str, Any], measured: Mapping[str, Measured] |
     -------
     Table
     """
-    table = Table(show_header=False)
+    table = Table(*map(_folded, ["", *([""] if not measured else ["", ""])]), show_header=False, **_LEAN)
     for name, value in _leaves(document):
         cells = [name, _number(value)]
         if measured:
             cells.append(str(measured[name]) if name in measured else "")
         table.add_row(*cells)
     return table
+
+
+def for_people(table: Table) -> RenderableType:
+    """Return a table without the columns that say nothing or the same in every row.
+
+    What is the same in all of several rows is said once, below the table.
+
+    Parameters
+    ----------
+    table : Table
+        Its cells are text.
+
+    Returns
+    -------
+    renderable of rich
+        The numbers are in one piece if the terminal is wide enough for the longest cells.
+    """
+    several = table.row_count > 1 and table.show_header
+    kept, common = [], []
+    for column in table.columns:
+        cells = [plain(cell) for cell in column.cells]
+        if several and len(set(cells)) == 1:
+            if cells[0] != _ABSENT:
+                common.append(f"{plain(column.header)}: {cells[0]}")
+        elif cells and set(cells) <= {_ABSENT}:
+            continue
+        else:
+            kept.append((column, cells))
+    lean = Table(title=table.title, show_header=table.show_header, **_LEAN)
+    for column, cells in kept:
+        lean.add_column(column.header, overflow="fold", min_width=_whole_width(cells))
+    for row in zip(*(column.cells for column, _ in kept), strict=True):
+        lean.add_row(*row)
+    return Group(lean, Text(f"All rows: {'; '.join(common)}")) if common else lean
+
+
+def _whole_width(cells: Sequence[str]) -> int:
+    """Return the width in which no short cell is divided, and no long one within a word."""
+    parts = [cell if len(cell) <= _WHOLE_CELL else max(cell.split(), key=len) for cell in cells]
+    return min(max(map(len, parts), default=0), _WHOLE_CELL)
+
+
+def plain(cell: Any) -> str:
+    """Return a cell of a table without its markup.
+
+    Parameters
+    ----------
+    cell : str or Text
+
+    Returns
+    -------
+    str
+    """
+    return Text.from_markup(cell).plain if isinstance(cell, str) else str(cell)
 
 
 def list_table(columns: Sequence[ListColumn], documents: Iterable[Mapping[str, Any]]) -> Table:
@@ -178,10 +240,15 @@ def list_table(columns: Sequence[ListColumn], documents: Iterable[Mapping[str, A
     -------
     Table
     """
+    rows = [
+        [list_cell(column.value(document))[: column.width] for column in columns] for document in documents
+    ]
     first, *others = (column.heading for column in columns)
-    table = Table(_whole(first), *map(_folded, others))
-    for document in documents:
-        table.add_row(*(escape(list_cell(column.value(document))[: column.width]) for column in columns))
+    table = Table(_whole(first), *map(_folded, others), **_LEAN)
+    for row in rows:
+        table.add_row(*map(escape, row))
+    for column, cells in zip(table.columns[1:], list(zip(*rows, strict=True))[1:], strict=False):
+        column.min_width = _whole_width(cells)
     return table
 
 
@@ -197,7 +264,7 @@ def list_cell(value: Any) -> str:
     -------
     str
     """
-    return ", ".join(map(_number, value)) if isinstance(value, list) else _number(value)
+    return _number(value)
 
 
 def _folded(heading: str) -> Column:
@@ -213,13 +280,22 @@ def _whole(heading: str) -> Column:
 def _leaves(document: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Any]]:
     leaves = []
     for name, value in document.items():
-        leaves += (
-            _leaves(value, f"{prefix}{name}.") if isinstance(value, Mapping) else [(f"{prefix}{name}", value)]
-        )
+        path = f"{prefix}{name}"
+        if isinstance(value, Mapping):
+            leaves += _leaves(value, f"{path}.")
+        elif isinstance(value, list) and value and isinstance(value[0], Mapping):
+            for index, element in enumerate(value):
+                leaves += _leaves(element, f"{path}.{index}.")
+        else:
+            leaves.append((path, value))
     return leaves
 
 
 def _number(value: Any) -> str:
-    if value is None:
+    if value is None or value == []:
         return _ABSENT
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, list):
+        return ", ".join(map(_number, value))
     return f"{value:.6g}" if isinstance(value, float) else str(value)

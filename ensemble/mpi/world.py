@@ -216,8 +216,35 @@ def tell(line: str) -> None:
     ----------
     line : str
     """
+    _teller[-1](f"ensemble: {line}")
+
+
+@contextmanager
+def telling(teller: Callable[[str], None]) -> Iterator[None]:
+    """Let a function show what is told within the block.
+
+    Parameters
+    ----------
+    teller : callable
+        Takes a line; also within a signal handler.
+
+    Yields
+    ------
+    None
+    """
+    _teller.append(teller)
+    try:
+        yield
+    finally:
+        _teller.pop()
+
+
+def _print_to_process(line: str) -> None:
     # The stream of the process: the command line silences sys.stderr on every rank but the first.
-    print(f"ensemble: {line}", file=sys.__stderr__, flush=True)
+    print(line, file=sys.__stderr__, flush=True)
+
+
+_teller: list[Callable[[str], None]] = [_print_to_process]
 
 
 @contextmanager

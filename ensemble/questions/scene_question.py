@@ -33,6 +33,7 @@ _COLUMNS = {
     "configuration": "configuration",
     "flow": "flow.kind",
     "rate": "flow.rate",
+    "reduced area": "vesicles.reduced_area",
     "hamaker": "adhesion.hamaker",
     "integrator": "numerics.integrator",
     "points": "work.points",
@@ -207,7 +208,7 @@ class SceneQuestion(Question[Scene]):
         listing : Listing
             Fields are those of the scene and the results, such as ``flow.rate``.
         columns : sequence of str
-            Such fields.
+            Such fields; without any the usual ones, and those by which the listing chooses and sorts.
 
         Returns
         -------
@@ -216,11 +217,16 @@ class SceneQuestion(Question[Scene]):
         """
         from ensemble.store.catalog_tables import RUN_FIELDS
         from ensemble.store.columns import column_of, columns_of
+        from ensemble.store.filters import compared_fields
 
-        shown = columns_of(columns, RUN_FIELDS) or tuple(
+        usual = [
             column_of(path, RUN_FIELDS, heading)._replace(width=SHORT_KEY if path == "key" else None)
             for heading, path in _COLUMNS.items()
-        )
+        ]
+        sorted_by = [] if listing.sort is None else [listing.sort.removeprefix("-")]
+        asked = dict.fromkeys([*compared_fields(listing.where), *sorted_by])
+        more = [path for path in asked if path not in _COLUMNS.values()]
+        shown = columns_of(columns, RUN_FIELDS) or (*usual, *columns_of(more, RUN_FIELDS))
         return StoredAnswers((json.loads(record.json) for record in store.run_records(listing)), shown)
 
 

@@ -247,10 +247,17 @@ def _columns() -> tuple[ListColumn, ...]:
     )
 
 
+_ADVICE = {
+    "undecided": " (runs reach their end without an outcome: a larger scene.horizon may help)",
+    "unbracketed": " (no change of the outcome within search.limits)",
+    "failed": " (ensemble query runs --where outcome=failed --columns key,failure says why)",
+}
+
+
 def _remarks(point: Mapping[str, Any]) -> Iterator[str]:
     """Yield what a reader must know of a point of a boundary, besides its bracket."""
     if point["status"] != "converged":
-        yield point["status"]
+        yield point["status"] + _ADVICE.get(point["status"], "")
     if point["incidental_changes"]:
         yield "other runs show further changes of the outcome"
 

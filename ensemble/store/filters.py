@@ -238,6 +238,28 @@ def without_reports(where: Sequence[str]) -> tuple[str, ...]:
     return tuple(where) if asks else (*where, "report=null")
 
 
+def compared_fields(where: Sequence[str]) -> tuple[str, ...]:
+    """Return the fields whose values filters compare, for a list that shows them.
+
+    Parameters
+    ----------
+    where : sequence of str
+        Filters, as `condition` takes them.
+
+    Returns
+    -------
+    tuple of str
+        Their dotted paths, each once; without those of which a filter asks only whether there is a value.
+
+    Raises
+    ------
+    StoreInputError
+        If a filter is malformed.
+    """
+    parts = map(_parts, where)
+    return tuple(dict.fromkeys(path for path, _, value in parts if value != "null"))
+
+
 def within(values: ParameterRange, document: JsonColumn, fields: Fields) -> ColumnElement[bool]:
     """Turn a range of a number into a condition on a JSON column.
 

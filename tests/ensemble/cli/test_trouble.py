@@ -233,3 +233,14 @@ def test_a_signal_ends_a_study_with_one_line(launcher, tmp_path: Path, ranks: in
         assert "Traceback" not in said
         assert said.count("interrupted") <= 1
         assert alive(str(store)) == []
+
+
+@pytest.mark.parametrize("command", [["presets"], ["presets", "doublet-shear"]])
+def test_output_that_nobody_reads_any_more_ends_a_command_silently(command: list[str]) -> None:
+    """As `ensemble presets | head -n 1` may do, with output that does or does not fit into a buffer.  3 s."""
+    process = subprocess.Popen([*ENSEMBLE, *command], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    assert process.stdout is not None
+    assert process.stderr is not None
+    process.stdout.close()
+    assert process.stderr.read() == b""
+    assert process.wait() == 1

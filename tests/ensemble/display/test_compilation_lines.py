@@ -27,11 +27,11 @@ def lines_about(functions: int, for_program: bool = False) -> list[str]:
 
 def test_compilation_is_said_once_and_then_now_and_again(monkeypatch: pytest.MonkeyPatch) -> None:
     assert lines_about(0) == []
-    assert lines_about(3) == ["compiling, once on this machine"]
+    assert lines_about(3) == ["compiling what this scene needs, once on this machine"]
     monkeypatch.setattr(display, "REPEAT_SECONDS", 0.0)
     assert lines_about(3)[1:] == [
-        "compiling, once on this machine: 2 functions in 0 s so far",
-        "compiling, once on this machine: 3 functions in 0 s so far",
+        "compiling what this scene needs, once on this machine: 2 functions in 0 s so far",
+        "compiling what this scene needs, once on this machine: 3 functions in 0 s so far",
     ]
 
 
@@ -39,6 +39,6 @@ def test_a_program_reads_of_compilation_in_json() -> None:
     (line,) = lines_about(1, for_program=True)
     assert json.loads(line) == {
         "fraction": 0.0,
-        "message": "compiling, once on this machine",
+        "message": "compiling what this scene needs, once on this machine",
         "reached": 0.0,
     }

@@ -115,7 +115,7 @@ def test_summaries_of_answers() -> None:
     ]
     study, scene = kind_named("study"), kind_named("scene")
     assert study.summary({"boundary": points}) == (
-        "2 of 3 points converged; flow.rate 1: unbracketed; "
+        "2 of 3 points converged; flow.rate 1: unbracketed (no change of the outcome within search.limits); "
         "flow.rate 2: other runs show further changes of the outcome"
     )
     assert scene.summary({"outcome": "bound", "failure": None}) == "bound"

@@ -196,7 +196,7 @@ def test_windows_are_found_listed_and_shown() -> None:
     columns = boundary_columns([point])
     cells = dict(zip(columns, boundary_cells(point, columns), strict=True))
     assert cells["other changes"].count("bound | separated") == 1
-    assert cells["scanned"].startswith(f"{point.scanned.values} values")
+    assert cells["scanned"].startswith(f"{point.scanned.values}, unseen")
 
 
 def test_without_a_scan_a_search_ends_with_the_change_that_it_finds(study: Study) -> None:
