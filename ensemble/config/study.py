@@ -16,7 +16,7 @@ from ensemble.config.geometric_grid import GeometricGrid
 from ensemble.config.overrides import LONGEST_NAME, override
 from ensemble.config.parameter_values import OneOrSeveral, ValueOf, number_locations, remember_scene
 from ensemble.config.validation import validated
-from solver.analysis.run import Outcome
+from solver.analysis.run import Configuration, Outcome
 from solver.scene import Model, Positive, Scene
 
 WITHOUT_ANSWER = (Outcome.UNDECIDED, Outcome.FAILED)
@@ -61,10 +61,10 @@ class Search(Model):
         Least and greatest value that may be tried, above 0.
     guesses : tuple of Guess
         Where the boundary is expected, until two of its points are known.
-    low : tuple of Outcome
-        Outcomes below the critical value.
-    high : tuple of Outcome
-        Outcomes above the critical value.
+    low : tuple of Outcome or Configuration
+        Outcomes below the critical value, or configurations, which then count instead of their outcome.
+    high : tuple of Outcome or Configuration
+        Those above the critical value.
     scan : int
         How many values in a decade are looked at all over the limits, from 0 to 100, so that other changes
         of the outcome are seen.  With 0 a search ends with the first change that it finds.
@@ -76,8 +76,8 @@ class Search(Model):
     tolerance: float = Field(0.01, ge=1e-9, le=0.5)
     limits: Interval
     guesses: tuple[Guess, ...] = ()
-    low: tuple[Outcome, ...] = Field(min_length=1)
-    high: tuple[Outcome, ...] = Field(min_length=1)
+    low: tuple[Outcome | Configuration, ...] = Field(min_length=1)
+    high: tuple[Outcome | Configuration, ...] = Field(min_length=1)
     scan: int = Field(2, ge=0, le=100)
     certify: bool = False
 
@@ -103,14 +103,16 @@ class Search(Model):
 
     @field_validator("low", "high")
     @classmethod
-    def _answers(cls, outcomes: tuple[Outcome, ...]) -> tuple[Outcome, ...]:
+    def _answers(cls, outcomes: tuple[Outcome | Configuration, ...]) -> tuple[Outcome | Configuration, ...]:
         if set(WITHOUT_ANSWER) & set(outcomes):
             raise ValueError(f"{' and '.join(WITHOUT_ANSWER)} are no answers and belong to neither side")
         return outcomes
 
     @field_validator("high")
     @classmethod
-    def _opposite(cls, high: tuple[Outcome, ...], info: ValidationInfo) -> tuple[Outcome, ...]:
+    def _opposite(
+        cls, high: tuple[Outcome | Configuration, ...], info: ValidationInfo
+    ) -> tuple[Outcome | Configuration, ...]:
         if set(high) & set(info.data.get("low", ())):
             raise ValueError("must share no outcome with low")
         return high

@@ -194,7 +194,8 @@ def _simulate(groups: Groups, leaders: Intracomm, store: StoreOnRank, task: Task
     except Stopped:
         return Unfinished(time.perf_counter() - begin)
     seconds = time.perf_counter() - begin
-    return Finished(store.stage_recorded(run, keeper.record), RunAnswer(run.outcome, run.sensitive), seconds)
+    answer = RunAnswer(run.outcome, run.sensitive, run.configuration)
+    return Finished(store.stage_recorded(run, keeper.record), answer, seconds)
 
 
 class Clock(Protocol):

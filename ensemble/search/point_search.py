@@ -9,7 +9,7 @@ from typing import Any, Generic, Protocol, TypeVar
 from ensemble.config.run_key import run_key
 from ensemble.search.critical_value import Side
 from ensemble.search.task_queue import RunAnswer, Task
-from solver.analysis.run import Outcome
+from solver.analysis.run import Configuration, Outcome
 from solver.scene import Scene
 
 
@@ -95,7 +95,7 @@ class PointSearch(Generic[SomeValueSearch]):
         search: SomeValueSearch,
         at: tuple[float, ...],
         scene_at: Callable[[float], Scene],
-        side: Callable[[Outcome], Side],
+        side: Callable[[Outcome | Configuration], Side],
         known: Callable[[str], RunAnswer | None],
     ) -> None:
         self.search = search

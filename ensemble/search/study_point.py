@@ -14,9 +14,15 @@ from ensemble.search.confirmation import CONFIRMING, Confirmation
 from ensemble.search.critical_value import SearchStatus
 from ensemble.search.point_search import PointSearch, SearchRun, SomeValueSearch
 from ensemble.search.scanning_search import ScanningSearch
-from ensemble.search.study_search import BracketSearch, certification_of, critical_value_search, side_of
+from ensemble.search.study_search import (
+    BracketSearch,
+    certification_of,
+    counted,
+    critical_value_search,
+    side_of,
+)
 from ensemble.search.task_queue import RunAnswer
-from solver.analysis.run import Outcome
+from solver.analysis.run import Configuration, Outcome
 from solver.scene import Scene
 
 ENDS = 2  # of a bracket, hence runs of a certification that finds both where they were
@@ -43,13 +49,13 @@ class StudyPoint:
     def __init__(self, study: Study, at: tuple[float, ...], known: Callable[[str], RunAnswer | None]) -> None:
         self._study = study
         self._at = at
-        self._known = known
+        self._known_run = known
         self._search: PointSearch[BracketSearch] = PointSearch(
             critical_value_search(study),
             at,
             partial(study.scene_at, at),
             partial(side_of, study),
-            known,
+            self._known,
         )
         self._confirmation = self._at_finer_numerics(Confirmation())
         self._certification: PointSearch[Certification] | None = None
@@ -103,7 +109,7 @@ class StudyPoint:
         answer : RunAnswer
             Of its run.
         """
-        self._owner(task).answer(task, answer)
+        self._owner(task).answer(task, counted(self._study, answer))
         self._confirm()
 
     def cancelled(self, task: SearchRun) -> None:
@@ -263,7 +269,11 @@ class StudyPoint:
         low, high = (None if end is None else self._outcome(end) for end in ends)
         return low, high
 
-    def _outcome(self, value: float) -> Outcome:
+    def _known(self, key: str) -> RunAnswer | None:
+        answer = self._known_run(key)
+        return answer and counted(self._study, answer)
+
+    def _outcome(self, value: float) -> Outcome | Configuration:
         is_finer = value in self._confirmation.search.sides
         return (self._confirmation if is_finer else self._search).answer_at(value).outcome
 

@@ -6,20 +6,41 @@ from ensemble.config.study import Study
 from ensemble.search.certification import Certification
 from ensemble.search.critical_value import CriticalValueSearch, Side
 from ensemble.search.scanning_search import ScanningSearch
-from solver.analysis.run import Outcome
+from ensemble.search.task_queue import RunAnswer
+from solver.analysis.run import Configuration, Outcome
 
 BracketSearch = CriticalValueSearch | ScanningSearch
 
 
-def side_of(study: Study, outcome: Outcome) -> Side:
+def counted(study: Study, answer: RunAnswer) -> RunAnswer:
+    """Return an answer as a study counts it: a configuration that the study names takes the outcome's place.
+
+    Parameters
+    ----------
+    study : Study
+        The study that asks.
+    answer : RunAnswer
+        Of one of its runs.
+
+    Returns
+    -------
+    RunAnswer
+    """
+    if answer.configuration not in (*study.search.low, *study.search.high):
+        return answer
+    assert answer.configuration is not None
+    return answer._replace(outcome=answer.configuration)
+
+
+def side_of(study: Study, outcome: Outcome | Configuration) -> Side:
     """Return the side of the critical value on which an outcome lies.
 
     Parameters
     ----------
     study : Study
         The study that asks.
-    outcome : Outcome
-        Of one of its runs.
+    outcome : Outcome or Configuration
+        Of one of its runs, as it is `counted`.
 
     Returns
     -------

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol, TypeVar
 
-from solver.analysis.run import Outcome
+from solver.analysis.run import Configuration, Outcome
 from solver.scene import Scene
 
 
@@ -33,13 +33,17 @@ class RunAnswer(NamedTuple):
 
     Attributes
     ----------
-    outcome : Outcome
+    outcome : Outcome or Configuration
+        The latter in a study that asks for it (`ensemble.search.study_search.counted`).
     sensitive : bool
         Whether the error of the run could have made it another one.
+    configuration : Configuration or None
+        Of a pair that has stayed together.
     """
 
-    outcome: Outcome
+    outcome: Outcome | Configuration
     sensitive: bool = False
+    configuration: Configuration | None = None
 
 
 class TaskQueue(Protocol[SomeTask]):

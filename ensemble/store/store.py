@@ -36,7 +36,7 @@ from ensemble.store.sql_database import UNUSABLE, Place, reason
 from ensemble.store.staging import RUNS, STORE_LOCK, RunStaging, Staged, patiently
 from ensemble.store.store_directory import create, exists, refused, require_catalog, require_writable
 from ensemble.store.writers import STAGING
-from solver.analysis.run import Outcome, Run
+from solver.analysis.run import Configuration, Outcome, Run
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -408,8 +408,13 @@ class Store(AbstractContextManager["Store"]):
         if record is None:
             return None
         document = json.loads(record.json)
-        # Records from before runs followed their errors do not say whether they are sensitive.
-        return RunAnswer(Outcome(document["outcome"]), document.get("sensitive", False))
+        # Records of before do not say whether they are sensitive, or have no configuration.
+        configuration = document.get("configuration")
+        return RunAnswer(
+            Outcome(document["outcome"]),
+            document.get("sensitive", False),
+            configuration and Configuration(configuration),
+        )
 
     def summary(self, key: str) -> RunSummary:
         """Return everything about a committed run except its arrays.
