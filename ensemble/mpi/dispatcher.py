@@ -34,7 +34,7 @@ _ORDERS = 1  # tag of messages to workers
 _REPORTS = 2  # tag of messages to the dispatcher
 _POLL_SECONDS = 0.002
 _PUBLISH_SECONDS = 0.5
-_PUBLISH_SHARE = 0.01  # of this thread's time that it takes at most; a boundary may have a thousand points
+_PUBLISH_SHARE = 0.005  # of this thread's time that it takes at most; a boundary may have a thousand points
 
 
 @dataclass(frozen=True)
@@ -229,7 +229,7 @@ class Dispatcher(Generic[SomeTask]):
         Where runs are committed.
     on_change : callable
         Called with the progress when outcomes or assignments have changed something, at most twice a second
-        and for a hundredth of the time, and at the end.
+        and for a two-hundredth of the time, and at the end.
     meter : UsageMeter
         Measures what the groups do.
     requests : EndRequests

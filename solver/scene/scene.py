@@ -7,6 +7,7 @@ viscosity 1; a length of 2π and a bending modulus of 1 are the defaults of a ve
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import Annotated, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
@@ -236,6 +237,7 @@ class Scene(Model):
         return self
 
 
+@lru_cache(maxsize=4)  # the scenes of a study have the same vesicles, or a few kinds of them
 def _overlapping_pair(vesicles: tuple[Vesicle, ...]) -> tuple[int, int] | None:
     """Return the indices of two vesicles that overlap at the start, None if all are apart."""
     ellipses = [index for index, vesicle in enumerate(vesicles) if vesicle.tangent_angle is None]
