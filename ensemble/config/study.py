@@ -118,6 +118,11 @@ class Search(Model):
         return high
 
     @property
+    def sides(self) -> tuple[Outcome | Configuration, ...]:
+        """The outcomes and configurations on both sides."""
+        return (*self.low, *self.high)
+
+    @property
     def grid(self) -> GeometricGrid:
         """The values that the search may try."""
         return GeometricGrid(self.tolerance)

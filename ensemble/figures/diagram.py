@@ -10,19 +10,19 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from ensemble.figures.style import BLACK, GRAY, MARKS, STYLE, VERMILLION, WIDTH
+from ensemble.figures.style import ALL_MARKS, BLACK, GRAY, STYLE, VERMILLION, WIDTH
 from ensemble.figures.symbols import Quantity, axis_label, describe, number_text, quantity
 from ensemble.search.boundary import Boundary, BoundaryPoint
 from ensemble.search.critical_value import SearchStatus
 from ensemble.search.line import Line, line_through
-from solver.analysis.run import Array, Outcome
+from solver.analysis.run import Array
 
 _NARROW = 5.0  # inches
 
 
 @matplotlib.rc_context(STYLE)
 def phase_diagram(
-    boundary: Boundary, runs: Sequence[tuple[float, float, Outcome]], width: float = WIDTH
+    boundary: Boundary, runs: Sequence[tuple[float, float, str]], width: float = WIDTH
 ) -> Figure:
     """Draw the runs and the boundary of a study in the plane of its two parameters.
 
@@ -68,8 +68,8 @@ def phase_diagram(
     return figure
 
 
-def _draw_runs(axes: Axes, runs: Sequence[tuple[float, float, Outcome]]) -> None:
-    for outcome, mark in MARKS.items():
+def _draw_runs(axes: Axes, runs: Sequence[tuple[float, float, str]]) -> None:
+    for outcome, mark in ALL_MARKS.items():
         places = np.array([(sweep, value) for sweep, value, result in runs if result == outcome])
         if places.size:
             axes.plot(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -9,7 +10,7 @@ import matplotlib
 import numpy as np
 from matplotlib.colors import ListedColormap
 
-from solver.analysis.run import Outcome
+from solver.analysis.run import Configuration, Outcome
 
 WIDTH: Final = 7.2  # inches, the text width of a two-column journal
 
@@ -133,4 +134,17 @@ MARKS: Final[dict[Outcome, Mark]] = {
     Outcome.COMPLETED: Mark(YELLOW, "h", face=YELLOW, edge=BLACK, edge_width=0.5),
     Outcome.UNDECIDED: Mark.hollow(ORANGE, "D"),
     Outcome.FAILED: Mark.hollow(BLACK, "+"),
+}
+# Those of tumbling pairs and tumbling vesicles are the same.
+CONFIGURATION_MARKS: Final[dict[Configuration, Mark]] = {
+    Configuration.SLIDING: Mark.filled(BLUE, "<"),
+    Configuration.ROLLING: Mark.filled(GREEN, ">"),
+    Configuration.TUMBLING: MARKS[Outcome.TUMBLING],
+    Configuration.FLAT: Mark.filled(SKY, "_"),
+    Configuration.MALE_FEMALE: Mark.filled(PURPLE, "p"),
+    Configuration.SIGMOID: Mark.filled(ORANGE, "d"),
+}
+# By the name of what counts in a study.
+ALL_MARKS: Final[Mapping[str, Mark]] = {str(name): mark for name, mark in MARKS.items()} | {
+    str(name): mark for name, mark in CONFIGURATION_MARKS.items()
 }

@@ -36,7 +36,6 @@ if TYPE_CHECKING:
     from ensemble.store import Store
     from ensemble.store.columns import ListColumn
     from ensemble.store.listing import Listing
-    from solver.analysis.run import Outcome
 
 _ENDS = 2  # of a bracket, hence limits that are run first, and runs at finer numerics
 
@@ -339,15 +338,20 @@ class _StoredBoundary(StoredAnswer):
             figure = phase_diagram(self.boundary, self._runs(), width)
         save(figure, output, options)
 
-    def _runs(self) -> list[tuple[float, float, Outcome]]:
-        """Return the swept value, the searched value and the outcome of every run behind the boundary."""
+    def _runs(self) -> list[tuple[float, float, str]]:
+        """Return the swept value, the searched value and what counts of every run behind the boundary."""
         from ensemble.config.dotted_paths import parameter_value
+        from ensemble.search.study_search import counted
+        from ensemble.search.task_queue import RunAnswer
 
-        runs = []
+        search = self.boundary.study["search"]
+        sides = (*search["low"], *search["high"])
+        runs: list[tuple[float, float, str]] = []
         for point in self.boundary.points:
             (at,) = self.boundary.place(point)
             for key in point.runs:
                 summary = self.store.summary(key)
                 value = parameter_value(summary.scene, self.boundary.searched)
-                runs.append((at, value, summary.outcome))
+                answer = RunAnswer(summary.outcome, configuration=summary.configuration)
+                runs.append((at, value, counted(answer, sides).outcome))
         return runs

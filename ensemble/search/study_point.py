@@ -109,7 +109,7 @@ class StudyPoint:
         answer : RunAnswer
             Of its run.
         """
-        self._owner(task).answer(task, counted(self._study, answer))
+        self._owner(task).answer(task, counted(answer, self._study.search.sides))
         self._confirm()
 
     def cancelled(self, task: SearchRun) -> None:
@@ -271,7 +271,7 @@ class StudyPoint:
 
     def _known(self, key: str) -> RunAnswer | None:
         answer = self._known_run(key)
-        return answer and counted(self._study, answer)
+        return answer and counted(answer, self._study.search.sides)
 
     def _outcome(self, value: float) -> Outcome | Configuration:
         is_finer = value in self._confirmation.search.sides

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 from ensemble.config.study import Study
 from ensemble.search.certification import Certification
 from ensemble.search.critical_value import CriticalValueSearch, Side
@@ -12,23 +14,22 @@ from solver.analysis.run import Configuration, Outcome
 BracketSearch = CriticalValueSearch | ScanningSearch
 
 
-def counted(study: Study, answer: RunAnswer) -> RunAnswer:
-    """Return an answer as a study counts it: a configuration that the study names takes the outcome's place.
+def counted(answer: RunAnswer, asked: Collection[str]) -> RunAnswer:
+    """Return an answer as a study counts it: a configuration that it asks for takes the place of the outcome.
 
     Parameters
     ----------
-    study : Study
-        The study that asks.
     answer : RunAnswer
-        Of one of its runs.
+        Of a run of the study.
+    asked : collection of str
+        The names on both sides of the boundary.
 
     Returns
     -------
     RunAnswer
     """
-    if answer.configuration not in (*study.search.low, *study.search.high):
+    if answer.configuration is None or answer.configuration not in asked:
         return answer
-    assert answer.configuration is not None
     return answer._replace(outcome=answer.configuration)
 
 

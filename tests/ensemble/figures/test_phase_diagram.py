@@ -10,10 +10,10 @@ import pytest
 from matplotlib.lines import Line2D
 
 from ensemble.figures import phase_diagram
-from ensemble.figures.style import MARKS
+from ensemble.figures.style import CONFIGURATION_MARKS, MARKS
 from ensemble.figures.symbols import describe
 from ensemble.search.boundary import Boundary, BoundaryPoint
-from solver.analysis.run import Outcome
+from solver.analysis.run import Configuration, Outcome
 from solver.scene import Scene, Units, Vesicle
 from tests.ensemble.made_runs import artist, scene
 
@@ -85,6 +85,9 @@ def test_outcomes_differ_in_color_and_in_shape() -> None:
     assert set(MARKS) == set(Outcome)
     assert len({mark.color for mark in MARKS.values()}) == len(Outcome)
     assert len({mark.shape for mark in MARKS.values()}) == len(Outcome)
+    assert set(CONFIGURATION_MARKS) == set(Configuration)
+    looks = {(mark.color, mark.shape) for marks in (MARKS, CONFIGURATION_MARKS) for mark in marks.values()}
+    assert len(looks) == len({*Outcome, *Configuration})  # tumbling is one of each
 
 
 def test_bars_span_the_brackets_and_open_brackets_have_none() -> None:

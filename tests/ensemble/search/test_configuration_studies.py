@@ -56,9 +56,9 @@ def test_the_boundary_between_any_two_is_found(low: str, high: str, critical: fl
 
 def test_a_configuration_counts_where_the_study_names_it() -> None:
     sliding = RunAnswer(Outcome.BOUND, configuration=Configuration.SLIDING)
-    assert counted(study("sliding", "tumbling"), sliding).outcome == "sliding"
-    assert counted(study("separated", "bound"), sliding).outcome == "bound"
-    assert counted(study("sliding", "tumbling"), RunAnswer(Outcome.BOUND)).outcome == "bound"
+    assert counted(sliding, ("sliding", "tumbling")).outcome == "sliding"
+    assert counted(sliding, ("separated", "bound")).outcome == "bound"
+    assert counted(RunAnswer(Outcome.BOUND), ("sliding", "tumbling")).outcome == "bound"
 
 
 def test_answers_of_a_store_have_their_configurations(tmp_path: Path) -> None:

@@ -181,15 +181,6 @@ def test_what_is_seen_at_the_end_is_how_far_apart_a_pair_is_and_whither_it_goes(
     assert critical_hamaker.fate_at_end(replace(run, outcome=Outcome.SEPARATED)) == "separated"
 
 
-def test_a_doublet_slides_by_its_last_turn_alone() -> None:
-    run = replace(orbit(), period=20.0)
-    distance = np.where(run.series["time"] < 20, 6.0, 2.6)
-    distance[-5] = 3.9
-    assert sheared_doublets.opening(
-        replace(run, series=dict(run.series) | {"center_distance": distance})
-    ) == pytest.approx(1.5)
-
-
 def test_the_ratio_of_a_published_period_is_that_of_the_published_table(
     contents: Contents,
 ) -> None:
