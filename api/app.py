@@ -17,7 +17,18 @@ from api.http.middleware import BodyLimits, Pieces, RequestMetrics, SecurityHead
 from api.http.openapi import add_models, shorten_descriptions
 from api.jobs.job import NoSuchJob
 from api.jobs.submissions import Submission
-from api.routes import boundaries, flows, jobs, kinds, operations, presets, reports, runs, unfinished_runs
+from api.routes import (
+    boundaries,
+    flows,
+    jobs,
+    kinds,
+    maps,
+    operations,
+    presets,
+    reports,
+    runs,
+    unfinished_runs,
+)
 from api.routes.operations import JobMetrics
 from api.routes.service import Service
 from api.routes.web_page import add_web_page
@@ -81,6 +92,7 @@ def create_app(service: Service, lifespan: Lifespan[FastAPI] | None = None) -> F
         runs.router,
         unfinished_runs.router,
         boundaries.router,
+        maps.router,
         presets.router,
         kinds.router,
         flows.router,

@@ -7,6 +7,7 @@ import { startTheme } from "./theme.js";
 import { showBoundaries } from "./views/boundaries.js";
 import { showJob } from "./views/job.js";
 import { showJobs } from "./views/jobs.js";
+import { showMaps } from "./views/maps.js";
 import { showReport, showReports } from "./views/reports.js";
 import { showRun } from "./views/run.js";
 import { showRuns } from "./views/runs.js";
@@ -27,6 +28,7 @@ startTheme();
 startRouter([
   { path: /^\/(?:boundaries)?$/, section: "boundaries", show: after(showBoundaries, loadFlows) },
   { path: /^\/boundaries\/(?<key>[0-9a-f]{16})$/, section: "boundaries", show: after(showBoundaries, loadFlows) },
+  { path: /^\/maps(?:\/(?<key>[0-9a-f]{16}))?$/, section: "maps", show: after(showMaps, loadFlows) },
   { path: /^\/runs$/, section: "runs", show: after(showRuns, loadFlows) },
   { path: /^\/runs\/(?<key>[0-9a-f]{32})$/, section: "runs", show: after(showRun, loadFlows) },
   { path: /^\/jobs$/, section: "jobs", show: after(showJobs, loadKinds) },

@@ -48,7 +48,9 @@ for _command in (
     schema_command.schema,
 ):
     app.command()(_command)
-app.command("continue")(steady_commands.follow)  # the name is a word of Python
+# The names are words of Python.
+app.command("continue")(steady_commands.follow)
+app.command("map")(question_commands.draw_map)
 
 
 def _print_version(requested: bool) -> None:

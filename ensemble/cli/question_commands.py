@@ -78,6 +78,23 @@ def run(  # numpydoc ignore=PR01
 COMMANDS = (bisect, run)
 
 
+def draw_map(  # numpydoc ignore=PR01
+    document: Document,
+    changes: Changes = [],  # noqa: B006
+    store: StorePath = DEFAULT_STORE,
+    ranks_per_run: RanksPerRun = None,
+    progress: ProgressAs = ProgressFormat.TEXT,
+    as_json: AsJson = False,
+) -> None:
+    """Find what becomes of a scene all over two of its parameters, on all ranks.
+
+    Cells are run where the label of runs changes, only those that the store does not have; the others have
+    the label of those around them.  The exit status is 4 if a run failed numerically.  The first Ctrl-C keeps
+    runs in progress and ends with status 75; the same command goes on.
+    """
+    answer_and_print("map", document, changes, store, ranks_per_run, progress, as_json)
+
+
 def _set_aside(scene: str, changes: list[str], path: Path) -> None:
     """Take the run of a scene out of a store that has it.  Collective."""
     from ensemble.config.overrides import parse_override

@@ -53,7 +53,7 @@ def query(  # numpydoc ignore=PR01
     collection: Annotated[
         str,
         typer.Argument(
-            metavar="runs|boundaries|branches|…",
+            metavar="runs|boundaries|maps|branches|…",
             help="What to list.",
             autocompletion=_collections,
             show_default=False,
@@ -67,7 +67,7 @@ def query(  # numpydoc ignore=PR01
     store: StorePath = DEFAULT_STORE,
     as_json: AsJson = False,
 ) -> None:
-    """List the runs, the boundaries or the branches of steady states of a store."""
+    """List the runs, the boundaries, the maps or the branches of steady states of a store."""
     from ensemble.questions.scene_question import SceneQuestion
     from ensemble.store.filters import without_reports
     from ensemble.store.listing import Listing
@@ -105,8 +105,8 @@ def show(  # numpydoc ignore=PR01
     name: Annotated[
         str,
         typer.Argument(
-            metavar="RUN|BOUNDARY|BRANCH",
-            help="Key of one of these or its beginning, or a boundary's name; also of a run that goes on.",
+            metavar="RUN|BOUNDARY|MAP|BRANCH",
+            help="Key of one of these or its beginning, or a name; also the key of a run that goes on.",
         ),
     ],
     output: Annotated[
@@ -130,7 +130,7 @@ def show(  # numpydoc ignore=PR01
     store: StorePath = DEFAULT_STORE,
     as_json: AsJson = False,
 ) -> None:
-    """Print a run, a boundary or a branch of steady states, or draw it to a file."""
+    """Print a run, a boundary, a map or a branch of steady states, or draw it to a file."""
     drawing = {"size": size, "dpi": dpi, "svg_text": svg_text or None}
     with refusing():
         options = _figure_options({name: each for name, each in drawing.items() if each is not None}, output)
@@ -181,7 +181,7 @@ def check(  # numpydoc ignore=PR01
     progress: ProgressAs = ProgressFormat.TEXT,
     as_json: AsJson = False,
 ) -> None:
-    """Verify every run, boundary and branch of a store; the exit status is 1 if anything is wrong.
+    """Verify every run, boundary, map and branch of a store; the exit status is 1 if anything is wrong.
 
     Runs that were interrupted and have a checkpoint are named, and are no problem.  A check that was
     interrupted goes on where it was, within a day.
@@ -216,7 +216,7 @@ def merge(  # numpydoc ignore=PR01
     into: Annotated[Path, typer.Option(metavar="DIR", help="Store that takes them.")],
     as_json: AsJson = False,
 ) -> None:
-    """Copy all that one store has into another; of a boundary in both, the newer one stays."""
+    """Copy all that one store has into another; of a boundary or map in both, the newer one stays."""
     from ensemble.store import Store
     from ensemble.store.merge import merge as copy
 
@@ -225,8 +225,8 @@ def merge(  # numpydoc ignore=PR01
     if as_json:
         print_json(merged._asdict())
     else:
-        copied = f"copied {merged.runs} runs, {merged.boundaries} boundaries and {merged.branches} branches"
-        print(f"{copied}; {merged.known_runs} runs were there already")
+        copied = f"copied {merged.runs} runs, {merged.boundaries} boundaries, {merged.branches} branches"
+        print(f"{copied} and {merged.maps} maps; {merged.known_runs} runs were there already")
 
 
 def export(  # numpydoc ignore=PR01

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, get_args
 
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
 from pydantic.json_schema import JsonSchemaValue
@@ -14,6 +14,10 @@ from ensemble.config.dotted_paths import Location, is_array, locations, value_at
 from ensemble.config.measured import dimension_at
 from solver.dimensions import Dimension, or_quantity
 from solver.scene import Scene
+
+# How pydantic tells an element from an array of it.
+ONE: Final = "one"
+SEVERAL: Final = "several"
 
 _SCENE: Final = "scene"  # key of the validated scene in the context of a validation
 
@@ -92,23 +96,28 @@ def _number(value: Any, dimension: Dimension | None, info: ValidationInfo) -> An
 
 
 class OneOrSeveral:
-    """Metadata of an array that documents write as its element if it has only one."""
+    """Metadata of a tuple that documents write as its element if it has only one."""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """Take an element for an array of it, and write it so."""
-        array = handler(source)
-        return core_schema.no_info_before_validator_function(
-            lambda given: tuple(given) if is_array(given) else (given,),
-            array,
-            serialization=core_schema.wrap_serializer_function_ser_schema(_written, schema=array),
+        """Take an element for a tuple of it, and write it so."""
+        several = handler(source)
+        one = handler.generate_schema(get_args(source)[0])
+        # Not a function before the tuple, which would see parsed JSON and lose its strict types.
+        return core_schema.tagged_union_schema(
+            {ONE: core_schema.no_info_after_validator_function(_alone, one), SEVERAL: several},
+            lambda given: SEVERAL if is_array(given) else ONE,
+            serialization=core_schema.wrap_serializer_function_ser_schema(_written, schema=several),
         )
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
         """Describe the element or the array."""
-        array = handler(schema)
-        return {"anyOf": [array["items"], array]}
+        return {"anyOf": handler(schema)["oneOf"]}
+
+
+def _alone(element: Any) -> tuple[Any]:
+    return (element,)
 
 
 def _written(elements: Any, handler: Callable[[Any], Any]) -> Any:

@@ -11,6 +11,7 @@ from pydantic import BaseModel, TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
 from ensemble.config.dotted_paths import Location, dotted, value_at
+from ensemble.config.parameter_values import ONE, SEVERAL
 from solver.dimensions import UNITS
 from solver.scene import Units
 
@@ -151,20 +152,14 @@ def _subject(problem: ErrorDetails, document: Mapping[str, Any]) -> str:
 
 
 def _without_tags(location: Location, document: Mapping[str, Any]) -> Location:
-    """Drop the names of union members, which pydantic puts after values and between tables and fields.
-
-    And the index of a table that stands for an array of it.
-    """
+    """Drop the names of union members, which pydantic puts after values and between tables and fields."""
     kept: list[str | int] = []
     for part in location:
         node = value_at(document, tuple(kept))
         if isinstance(node, str | int | float):
             break
-        is_tag = (
-            isinstance(node, Mapping)
-            and part not in node
-            and (part in node.values() or isinstance(part, int))
-        )
+        is_kind = isinstance(node, Mapping) and part not in node and part in node.values()
+        is_tag = is_kind or (part in (ONE, SEVERAL) and value_at(node, (part,)) is None)
         if not is_tag:
             kept.append(part)
     return tuple(kept)

@@ -1,4 +1,4 @@
-"""Questions that the package answers, one module for each kind: a study, a single scene.
+"""Questions that the package answers, one module for each kind: a study, a map, a single scene.
 
 The command line and the service know of a kind only what `Question` states.  To add a kind:
 
@@ -44,6 +44,7 @@ __all__ = [
 GROUP: Final = "ensemble.questions"
 KINDS: Final = (
     EntryPoint("study", "ensemble.questions.study_question:StudyQuestion", GROUP),
+    EntryPoint("map", "ensemble.questions.map_question:MapQuestion", GROUP),
     EntryPoint("scene", "ensemble.questions.scene_question:SceneQuestion", GROUP),
 )
 

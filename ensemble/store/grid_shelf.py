@@ -10,13 +10,17 @@ import os
 import shutil
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
 
 from ensemble.disk import flush, flush_tree, locked
 from ensemble.errors import StoreError
-from ensemble.store.run_record import NamedArray
+from ensemble.store.run_record import NamedArray, first_problem
 from ensemble.store.staging import STORE_LOCK
 from ensemble.store.zarr_groups import ARCHIVE, StoredGroup, write_group
+
+SomeAnswer = TypeVar("SomeAnswer", bound=BaseModel)
 
 
 class GridShelf:
@@ -85,6 +89,31 @@ class GridShelf:
             If it is not there, or its files are damaged.
         """
         return StoredGroup(self._directory / key, self._kind)
+
+    def read(self, key: str, model: type[SomeAnswer]) -> SomeAnswer:
+        """Read an answer without its arrays.
+
+        Parameters
+        ----------
+        key : str
+        model : type
+            Of its attributes.
+
+        Returns
+        -------
+        BaseModel
+            An instance of the model.
+
+        Raises
+        ------
+        StoreError
+            If it is not there, or its files are damaged.
+        """
+        group = self.group(key)
+        try:
+            return model.model_validate(group.attributes)
+        except ValidationError as error:
+            raise StoreError(f"{group.name}: unreadable attributes ({first_problem(error)})") from error
 
     def problems(self, arrays: tuple[str, ...]) -> list[str]:
         """Verify every answer.

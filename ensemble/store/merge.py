@@ -1,4 +1,4 @@
-"""Runs, branches and boundaries of one store, copied into another."""
+"""Runs, branches, boundaries and maps of one store, copied into another."""
 
 from __future__ import annotations
 
@@ -11,16 +11,17 @@ from ensemble.store.store import Store
 
 
 class Merged(NamedTuple):
-    """How many runs, boundaries and branches were copied, and how many of the runs were there already."""
+    """How many runs, boundaries, branches and maps were copied, and how many runs were there already."""
 
     runs: int
     boundaries: int
     branches: int
+    maps: int
     known_runs: int
 
 
 def merge(source: Store, target: Store) -> Merged:
-    """Copy all that one store has into another; of a boundary in both, the newer one stays.
+    """Copy all that one store has into another; of a boundary or map in both, the newer one stays.
 
     Parameters
     ----------
@@ -46,7 +47,8 @@ def merge(source: Store, target: Store) -> Merged:
             continue
         target.save(source.load(record.key), validated(RunSummary, "run", record))
         runs += 1
-    return Merged(runs, _merge_boundaries(source, target), _merge_branches(source, target), known)
+    boundaries, branches = _merge_boundaries(source, target), _merge_branches(source, target)
+    return Merged(runs, boundaries, branches, _merge_maps(source, target), known)
 
 
 def _merge_boundaries(source: Store, target: Store) -> int:
@@ -59,6 +61,14 @@ def _merge_boundaries(source: Store, target: Store) -> int:
             target.save_boundary_arrays(boundary)
             copied += 1
     return copied
+
+
+def _merge_maps(source: Store, target: Store) -> int:
+    there = {record.key: record.updated for record in target.maps()}
+    newer = [each for each in source.maps() if each.key not in there or there[each.key] < each.updated]
+    for record in newer:
+        target.save_map(record)
+    return len(newer)
 
 
 def _merge_branches(source: Store, target: Store) -> int:

@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from pydantic import BaseModel
 
     from ensemble.search.branch_summary import BranchSummary
+    from ensemble.search.map_record import MapRecord
     from ensemble.store.archive import StoredArrays
     from ensemble.store.branch_shelf import BranchShelf
     from ensemble.store.grid_shelf import GridShelf
@@ -53,6 +54,7 @@ if TYPE_CHECKING:
     from solver.simulation.steady_scenes import SteadyBranch
 
 BOUNDARIES = "boundaries"
+MAPS = "maps"
 
 _CANDIDATES = 5  # keys that a message about an ambiguous one names
 
@@ -813,6 +815,70 @@ class Store(AbstractContextManager["Store"]):
 
         self._save_grid(self.boundary_grids, boundary.study_key, boundary, boundary_arrays(boundary))
 
+    @cached_property
+    def map_grids(self) -> GridShelf:
+        """The maps."""
+        from ensemble.store.grid_shelf import GridShelf
+
+        return GridShelf(self.path, MAPS, "map")
+
+    def save_map(self, record: MapRecord) -> None:
+        """Keep a map instead of an earlier one that answers the same question.
+
+        Parameters
+        ----------
+        record : MapRecord
+
+        Raises
+        ------
+        StoreError
+            If it could not be written.
+        """
+        from ensemble.store.map_arrays import map_arrays
+
+        self._save_grid(self.map_grids, record.key, record, map_arrays(record))
+
+    def maps(self) -> list[MapRecord]:
+        """Return all maps, the newest first.
+
+        Returns
+        -------
+        list of MapRecord
+
+        Raises
+        ------
+        StoreError
+            If one of them is damaged.
+        """
+        from ensemble.search.map_record import MapRecord
+
+        records = [self.map_grids.read(key, MapRecord) for key in self.map_grids.keys()]  # noqa: SIM118
+        return sorted(records, key=lambda record: record.updated, reverse=True)
+
+    def map(self, key: str) -> MapRecord:
+        """Return a map.
+
+        Parameters
+        ----------
+        key : str
+
+        Returns
+        -------
+        MapRecord
+
+        Raises
+        ------
+        NotStored
+            If there is no map of this key.
+        StoreError
+            If it is damaged.
+        """
+        from ensemble.search.map_record import MapRecord
+
+        if key not in self.map_grids.keys():  # noqa: SIM118
+            raise NotStored(f"map: there is no map {key} in {self.path}")
+        return self.map_grids.read(key, MapRecord)
+
     def _save_grid(
         self, shelf: GridShelf, key: str, answer: BaseModel, arrays: Mapping[str, NamedArray]
     ) -> None:
@@ -841,6 +907,7 @@ class Store(AbstractContextManager["Store"]):
             Problems, one sentence each; empty if the store is whole.
         """
         from ensemble.store.boundary_arrays import BOUNDARY_ARRAYS
+        from ensemble.store.map_arrays import MAP_ARRAYS
         from ensemble.store.verification import CheckNotes, run_problems
 
         problems = []
@@ -868,7 +935,7 @@ class Store(AbstractContextManager["Store"]):
             notes.write()
             raise
         notes.remove()
-        grids = self.boundary_grids.problems(BOUNDARY_ARRAYS)
+        grids = [*self.boundary_grids.problems(BOUNDARY_ARRAYS), *self.map_grids.problems(MAP_ARRAYS)]
         return [*different, *problems, *self.branches.problems(), *grids]
 
 

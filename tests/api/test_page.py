@@ -18,11 +18,13 @@ from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, ConsoleMessage, Page, Response, expect, sync_playwright
 
 from api.auth import TokenScope
-from ensemble.config.documents import load_scene, load_study, preset_document, preset_names
+from ensemble.config.documents import load, load_scene, load_study, preset_document, preset_names
+from ensemble.config.outcome_map import OutcomeMap
 from ensemble.config.run_key import run_key
 from ensemble.report import PAGE, ReportName, report_directory
 from ensemble.report.report_page import report_page
 from ensemble.search.boundary import Boundary, BoundaryPoint
+from ensemble.search.map_record import MapRecord, MapRunRecord
 from ensemble.store import Store
 from solver import Simulation
 from solver.analysis.run import Outcome, Run
@@ -311,6 +313,31 @@ def test_a_surface_is_curves_and_a_map_and_is_read_at_two_values(page: Page, url
     expect(page.get_by_text(f"{0.75 * 0.85:.4g}", exact=True)).to_be_visible()
     page.goto(f"{url}/#/new?preset=critical-hamaker-surface")
     expect(page.get_by_label("values of the reduced area")).to_have_value(re.compile("0.8.*0.9"))
+
+
+def test_a_map_is_shown_and_a_dot_leads_to_its_run(page: Page, url: str, store: Path, run: Run) -> None:
+    question = load(OutcomeMap, "shear-hamaker-map", {"axes.resolution": 0.5})
+    record = MapRecord(
+        key=question.key,
+        name=question.name,
+        map=question.model_dump(mode="json"),
+        labels=["bound", "separated"],
+        cells=[[0, 0], [1, 1]],
+        runs=[MapRunRecord(cell=(0, 1), run=run_key(run.scene))],
+        updated=EARLIER,
+    )
+    page.goto(f"{url}/#/maps")
+    expect(page.get_by_role("link", name="Draw the first one")).to_be_visible()
+    with Store.open(store) as opened:
+        opened.save_map(record)
+    page.goto(f"{url}/#/maps/{record.key}")
+    expect(page.get_by_role("heading", level=1)).to_have_text("Outcome over shear rate and Hamaker constant")
+    expect(page.locator(".heatmaplayer image")).to_have_count(1)
+    expect(page.get_by_role("table", name="Shares of the map")).to_contain_text("50 %")
+    dot = page.locator(".scatterlayer .point").first.bounding_box()
+    assert dot is not None
+    page.mouse.click(dot["x"] + dot["width"] / 2, dot["y"] + dot["height"] / 2)
+    page.wait_for_url(f"**/runs/{run_key(run.scene)}**")
 
 
 def test_the_name_of_a_study_is_not_interpreted_as_html(page: Page, url: str, store: Path) -> None:

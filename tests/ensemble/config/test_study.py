@@ -42,6 +42,8 @@ PUBLISHED = (
 MANY = ("cluster-quiescent", "suspension-shear")
 SCENES = (*PUBLISHED, *MANY, "doublet-linear", "doublet-ramp", "vesicle-poiseuille", "doublet-unequal")
 
+MAPS = ("shear-hamaker-map",)
+
 HAMAKER = load_study("critical-hamaker")
 
 
@@ -56,7 +58,7 @@ def ellipse_half_width(reduced_area: float, length: float) -> float:
 
 
 def test_all_presets_ship() -> None:
-    assert preset_names() == tuple(sorted(STUDIES + SCENES))
+    assert preset_names() == tuple(sorted(STUDIES + SCENES + MAPS))
 
 
 @pytest.mark.parametrize("name", STUDIES)

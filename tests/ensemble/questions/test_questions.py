@@ -33,12 +33,14 @@ def test_every_preset_is_of_one_kind() -> None:
     "document", [{}, {"vesicles": [{}]}, preset_document("doublet-shear") | {"search": {}}]
 )
 def test_a_document_of_no_kind_or_of_two_is_refused(document: dict[str, Any]) -> None:
-    with pytest.raises(ValueError, match=r"exactly one of the keys 'search' \(study\), 'horizon' \(scene\)"):
+    with pytest.raises(
+        ValueError, match=r"exactly one of the keys 'search' \(study\), 'axes' \(map\), 'horizon' \(scene\)"
+    ):
         kind_of(document)
 
 
 def test_what_is_no_kind_is_refused() -> None:
-    with pytest.raises(ValueError, match="'novel' is no kind of question; kinds: study, scene"):
+    with pytest.raises(ValueError, match="'novel' is no kind of question; kinds: study, map, scene"):
         kind_named("novel")
     with pytest.raises(ValueError, match="Numerics"):
         kind_of_model(Numerics())

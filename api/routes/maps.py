@@ -1,0 +1,140 @@
+"""Maps: what becomes of a scene all over two of its parameters."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from http import HTTPStatus
+from typing import Annotated
+
+from fastapi import APIRouter, Path, Query, Request, Response
+
+from api.http.caching import NOT_MODIFIED, REVALIDATE, cached_response, etag, json_response
+from api.http.paging import After, CollectionPage, Limit, page_response
+from api.http.problems import documented
+from api.results.downloads import file_response
+from api.routes.service import Reader
+from api.routes.streaming import as_file, stream_file
+from ensemble.search.map_record import MapRecord
+from ensemble.store import Record
+
+router = APIRouter(prefix="/maps", tags=["maps"])
+
+MapKey = Annotated[str, Path(pattern="^[0-9a-f]{16}$", description="Key of the map.")]
+
+
+class MapFile(StrEnum):
+    """What a map can be downloaded as; the value is the suffix of the file."""
+
+    PNG = "png"
+    SVG = "svg"
+    PDF = "pdf"
+
+
+class MapDocument(MapRecord):
+    """A map with the values along its axes.
+
+    Attributes
+    ----------
+    edges : (list of float, list of float)
+        The ends of the cells along each axis: one more than there are cells.
+    values : (list of float, list of float)
+        The values in the middles of the cells.
+    """
+
+    edges: tuple[list[float], list[float]]
+    values: tuple[list[float], list[float]]
+
+    @classmethod
+    def text_of(cls, record: MapRecord) -> str:
+        """Return the JSON text of a map.
+
+        Parameters
+        ----------
+        record : MapRecord
+
+        Returns
+        -------
+        str
+        """
+        axes = record.question.axes
+        along = {"edges": [axis.edges for axis in axes], "values": [axis.values for axis in axes]}
+        return cls.model_validate(record.model_dump() | along).model_dump_json()
+
+
+@router.get("", response_model=CollectionPage[MapDocument])
+def list_maps(request: Request, reader: Reader, after: After = None, limit: Limit = 100) -> Response:
+    """List the maps, in the order of their keys.
+
+    Parameters
+    ----------
+    request : Request
+    reader : Caller
+    after : str or None
+        Key of the last item of the previous page.
+    limit : int
+        Largest number of items.
+
+    Returns
+    -------
+    Response
+    """
+    maps = sorted(reader.service.store.maps(), key=lambda record: record.key)
+    following = [record for record in maps if after is None or record.key > after][: limit + 1]
+    records = [Record(record.key, MapDocument.text_of(record)) for record in following]
+    return page_response(request, records, limit)
+
+
+@router.get("/{key}", response_model=MapDocument, responses=NOT_MODIFIED | documented(HTTPStatus.NOT_FOUND))
+def get_map(request: Request, reader: Reader, key: MapKey) -> Response:
+    """Give a map: the label of every cell, and the runs behind it.
+
+    Parameters
+    ----------
+    request : Request
+    reader : Caller
+    key : str
+        Of the map.
+
+    Returns
+    -------
+    Response
+
+    Raises
+    ------
+    NotStored
+        If there is no map of this key.
+    """
+    text = MapDocument.text_of(reader.service.store.map(key))
+    return cached_response(request, etag(text), REVALIDATE, lambda: json_response(text))
+
+
+@router.get("/{key}/file", responses=NOT_MODIFIED | documented(HTTPStatus.NOT_FOUND) | file_response(MapFile))
+def get_map_file(
+    request: Request,
+    reader: Reader,
+    key: MapKey,
+    format: Annotated[MapFile, Query(description="Suffix of the file.")],
+) -> Response:
+    """Give a map as a figure.
+
+    Parameters
+    ----------
+    request : Request
+    reader : Caller
+    key : str
+        Of the map.
+    format : MapFile
+
+    Returns
+    -------
+    Response
+
+    Raises
+    ------
+    NotStored
+        If there is no map of this key.
+    """
+    record = reader.service.store.map(key)
+    tag = etag(record.model_dump_json(), "file", format)
+    answer = cached_response(request, tag, REVALIDATE, lambda: stream_file(reader, request, key, format))
+    return as_file(answer, f"map-{key[:8]}.{format}")

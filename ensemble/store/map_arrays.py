@@ -1,0 +1,43 @@
+"""A map as arrays over the values of its two parameters."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from ensemble.search.map_record import MapRecord
+from ensemble.store.flagged_text import Flags
+from ensemble.store.run_record import NamedArray, parameter_attributes
+
+# What every map has as arrays over the parameters.
+MAP_ARRAYS: Final = ("label", "made")
+
+
+def map_arrays(record: MapRecord) -> dict[str, NamedArray]:
+    """Return the arrays of a map by name.
+
+    Parameters
+    ----------
+    record : MapRecord
+
+    Returns
+    -------
+    dict of str to NamedArray
+        The two parameters by their paths, in the middles of the cells, and over both of them ``label``, whose
+        attribute ``flag_meanings`` explains the numbers, and ``made``, 1 where a cell was run.
+    """
+    axes = record.question.axes
+    dimensions = tuple(axis.parameter for axis in axes)
+    made = np.zeros(record.numbers.shape)
+    for each in record.runs:
+        made[each.cell] = 1.0
+    coordinates = {
+        axis.parameter: NamedArray(
+            (axis.parameter,), np.array(axis.values), parameter_attributes(record.scene, axis.parameter)
+        )
+        for axis in axes
+    }
+    # The words are sorted in a record, too, so their numbers are the same.
+    label = NamedArray(dimensions, record.numbers.astype(float), Flags.of(record.labels).attributes)
+    return coordinates | {"label": label, "made": NamedArray(dimensions, made)}

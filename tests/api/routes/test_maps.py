@@ -1,0 +1,66 @@
+"""Maps over HTTP."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+
+from ensemble.config.documents import load
+from ensemble.config.outcome_map import OutcomeMap
+from ensemble.search.map_record import MapRecord, MapRunRecord
+from ensemble.store import Store
+from tests.api.servers import client_of
+
+
+def example_map(key: str | None = None) -> MapRecord:
+    """A map of two by two cells."""
+    question = load(OutcomeMap, "shear-hamaker-map", {"axes.resolution": 0.5})
+    return MapRecord(
+        key=key or question.key,
+        name=question.name,
+        map=question.model_dump(mode="json"),
+        labels=["bound", "separated"],
+        cells=[[1, 0], [1, 1]],
+        runs=[MapRunRecord(cell=(0, 1), run=32 * "a")],
+        updated=datetime(2026, 1, 1, tzinfo=UTC),
+    )
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> Path:
+    with Store.open(tmp_path / "store") as opened:
+        opened.save_map(example_map())
+        opened.save_map(example_map(16 * "0"))
+    return tmp_path / "store"
+
+
+def test_maps_are_listed_and_given_with_the_values_along_their_axes(store: Path) -> None:
+    with client_of(store) as client:
+        page = client.get("/maps", params={"limit": 1}).json()
+        assert [each["key"] for each in page["items"]] == [16 * "0"]
+        assert [each["key"] for each in client.get(page["next"]).json()["items"]] == [example_map().key]
+        answer = client.get(f"/maps/{example_map().key}")
+        document = answer.json()
+        assert document["values"] == [[0.55, 1.25], [0.45, 1.15]]
+        assert document["edges"] == [[0.2, 0.9, 1.6], [0.1, 0.8, 1.5]]
+        assert (document["cells"], document["runs"][0]["cell"]) == ([[1, 0], [1, 1]], [0, 1])
+        tag = {"If-None-Match": answer.headers["etag"]}
+        assert client.get(f"/maps/{example_map().key}", headers=tag).status_code == 304
+
+
+def test_what_is_no_map_is_not_found(store: Path) -> None:
+    with client_of(store) as client:
+        assert client.get(f"/maps/{16 * 'f'}").status_code == 404
+        assert client.get(f"/maps/{16 * 'f'}/file?format=png").status_code == 404
+        assert client.get(f"/maps/{example_map().key}/file?format=csv").status_code == 422
+        assert client.get("/maps/nothing").status_code == 422
+
+
+def test_a_map_is_given_as_a_figure(store: Path) -> None:
+    """Takes 3 s: the figure is made by a process of its own."""
+    with client_of(store) as client:
+        answer = client.get(f"/maps/{example_map().key}/file", params={"format": "png"})
+    assert answer.headers["content-type"] == "image/png"
+    assert answer.content.startswith(b"\x89PNG")
