@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from ensemble.search.boundary import Boundary, BoundaryPoint
-from ensemble.store.flagged_text import Flags, words_of
+from ensemble.store.flagged_text import Flags, data_variable
 from ensemble.store.run_record import NamedArray, parameter_attributes
 
 if TYPE_CHECKING:
@@ -87,7 +87,4 @@ def boundary_dataset(boundary: Boundary) -> xarray.Dataset:
         coords={SIDE: list(SIDES)},
         attrs={"name": boundary.name, "study_key": boundary.study_key, "parameter": boundary.searched},
     )
-    for name, array in boundary_arrays(boundary).items():
-        words = words_of(array.values[:], array.attributes)
-        data[name] = (array.dimensions, array.values[:] if words is None else words, array.attributes)
-    return data
+    return data.assign({name: data_variable(array) for name, array in boundary_arrays(boundary).items()})

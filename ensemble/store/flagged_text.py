@@ -8,6 +8,7 @@ from typing import Any, Final, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from ensemble.store.run_record import NamedArray
 from solver.analysis.run import Array
 
 _FLAGS: Final = "flag_values"
@@ -43,6 +44,23 @@ class Flags(NamedTuple):
         """
         codes = {word: float(number) for number, word in enumerate(sorted(set(words)))}
         return cls(codes, {_FLAGS: list(codes.values()), _MEANINGS: " ".join(codes)})
+
+
+def data_variable(array: NamedArray) -> tuple[tuple[str, ...], NDArray[Any], dict[str, Any]]:
+    """Return what xarray takes for an array: with words instead of the numbers that stand for them.
+
+    Parameters
+    ----------
+    array : NamedArray
+
+    Returns
+    -------
+    dimensions : tuple of str
+    values : array
+    attributes : dict
+    """
+    words = words_of(array.values[:], array.attributes)
+    return array.dimensions, array.values[:] if words is None else words, array.attributes
 
 
 def words_of(values: Array, attributes: Mapping[str, Any]) -> NDArray[Any] | None:

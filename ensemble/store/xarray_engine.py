@@ -18,6 +18,7 @@ from ensemble.errors import StoreError
 from ensemble.search.branch_summary import BranchSummary
 from ensemble.store.boundary_arrays import boundary_dataset
 from ensemble.store.datasets import branch_dataset, run_dataset
+from ensemble.store.map_arrays import map_dataset
 from ensemble.store.store import Store
 from ensemble.store.store_directory import exists
 
@@ -25,7 +26,7 @@ _log = logging.getLogger(__name__)
 
 
 class StoreEntrypoint(BackendEntrypoint):
-    """Opens a store as groups of data sets: ``/runs/KEY``, ``/boundaries/KEY`` and ``/branches/KEY``."""
+    """Opens a store as groups of data sets: ``/runs/KEY``, ``/boundaries/KEY`` and so on."""
 
     description: ClassVar[str] = "Stores of vesicle-ensemble"
     supports_groups: ClassVar[bool] = True
@@ -46,7 +47,7 @@ class StoreEntrypoint(BackendEntrypoint):
     def open_groups_as_dict(
         self, filename_or_obj: Any, *, drop_variables: Any = None, where: Sequence[str] = ()
     ) -> dict[str, Dataset]:
-        """Open the runs, the boundaries and the branches of a store.
+        """Open the runs, the boundaries, the maps and the branches of a store.
 
         Parameters
         ----------
@@ -64,13 +65,14 @@ class StoreEntrypoint(BackendEntrypoint):
             groups = {"/": Dataset(), "/runs": Dataset()}
             groups |= {f"/runs/{each.key}": run_dataset(store.path, each) for each in store.summaries(where)}
             groups |= {f"/boundaries/{each.study_key}": boundary_dataset(each) for each in store.boundaries()}
+            groups |= {f"/maps/{each.key}": map_dataset(each) for each in store.maps()}
             groups |= {f"/branches/{each.key}": branch_dataset(store.path, each) for each in _branches(store)}
         return {path: data.drop_vars(drop_variables or (), errors="ignore") for path, data in groups.items()}
 
     def open_datatree(
         self, filename_or_obj: Any, *, drop_variables: Any = None, where: Sequence[str] = ()
     ) -> DataTree:
-        """Open the runs, the boundaries and the branches of a store; see `open_groups_as_dict`.
+        """Open the runs, boundaries, maps and branches of a store; see `open_groups_as_dict`.
 
         Parameters
         ----------

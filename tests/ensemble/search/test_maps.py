@@ -144,6 +144,8 @@ def test_a_map_is_kept_and_drawn_as_it_is(tmp_path: Path) -> None:
     here = {"flow.rate": 0.2, "adhesion.hamaker": 1.5}
     assert words[int(data["label"].sel(here, method="nearest"))] == "bound"
     assert int(data["made"].sum()) == len(record.runs)
+    tree = xarray.open_datatree(tmp_path / "store")
+    assert tree[f"maps/{record.key}"]["label"].sel(here, method="nearest") == "bound"
     (axes,) = map_diagram(record).axes
     (regions,) = (each for each in axes.collections if each.get_gid() == "regions")
     np.testing.assert_array_equal(np.reshape(regions.get_array(), (10, 8)), record.numbers.T)
