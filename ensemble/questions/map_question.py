@@ -71,6 +71,10 @@ class MapQuestion(Question[OutcomeMap]):
         """See `Question`.
 
         Counted are the cells of the first lattice, and those along a boundary from one side to the other.
+
+        Returns
+        -------
+        list of (Scene, int)
         """
         columns, rows = self.document.shape
         corners = [self.document.scene_at((i, j)) for i in (0, columns - 1) for j in (0, rows - 1)]

@@ -61,6 +61,6 @@ def test_what_is_no_map_is_not_found(store: Path) -> None:
 def test_a_map_is_given_as_a_figure(store: Path) -> None:
     """Takes 3 s: the figure is made by a process of its own."""
     with client_of(store) as client:
-        answer = client.get(f"/maps/{example_map().key}/file", params={"format": "png"})
+        answer = client.get(f"/maps/{example_map().key}/file", params={"format": "png"}, timeout=300)
     assert answer.headers["content-type"] == "image/png"
     assert answer.content.startswith(b"\x89PNG")
