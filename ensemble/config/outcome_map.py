@@ -91,7 +91,8 @@ class OutcomeMap(Model):
     axes : (Axis, Axis)
         The two parameters.
     label : str
-        By which word of a run cells are told apart: ``outcome``.
+        By which word of a run cells are told apart: ``outcome``, or ``configuration``, which is that of a
+        pair that stays together and else the outcome.
     scan : int
         Into how many parts each axis is divided at first, from 1 to 100: regions that are narrower may go
         unseen.

@@ -74,7 +74,8 @@ def map_diagram(record: MapRecord, width: float = WIDTH) -> Figure:
 def _colors(labels: list[str]) -> list[str]:
     """Return the color of each label: that of its mark if it is an outcome."""
     of_outcomes = {str(outcome): mark.color for outcome, mark in MARKS.items()}
-    others = cycle(CLUSTER_COLORS)
+    taken = {of_outcomes.get(label) for label in labels}
+    others = cycle(color for color in CLUSTER_COLORS if color not in taken)
     return [of_outcomes.get(label) or next(others) for label in labels]
 
 

@@ -11,6 +11,7 @@ from ensemble.search.map_record import MapRecord, MapRunRecord
 from ensemble.search.map_refinement import Cell, MapRefinement
 from ensemble.search.task_queue import RunAnswer, Task
 from ensemble.timestamp import now
+from solver.analysis.run_labels import label_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -134,5 +135,5 @@ class MapPlanner:
 
     def _tell(self, task: MapRun, answer: RunAnswer) -> None:
         self._keys[task.cell] = task.key
-        label = answer.labels[self._map.label]
+        label = label_of(self._map.label, answer)
         self._refinement.tell(task.cell, self._numbers.setdefault(label, len(self._numbers)))

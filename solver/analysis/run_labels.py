@@ -1,7 +1,7 @@
 """Labels of runs: words by which the cells of a map are told apart.
 
-To add a label, write a function from the results of a run to a word without blanks, which reads only fields
-that a stored summary has, too, and register it with `add_label`.
+To add a label, write a function from the answer of a run to a word without blanks, and register it with
+`add_label`.  It may read the fields of `ensemble.search.task_queue.RunAnswer`.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def add_label(name: str, label: Callable[[Any], str]) -> None:
     name : str
         By which documents name it.
     label : callable
-        Takes the results of a run, or their summary in a store, and returns a word.
+        Takes the answer of a run and returns a word.
 
     Raises
     ------
@@ -35,20 +35,21 @@ def add_label(name: str, label: Callable[[Any], str]) -> None:
     _FUNCTIONS[name] = label
 
 
-def labels_of(run: Any) -> dict[str, str]:
-    """Return all labels of a run.
+def label_of(name: str, run: Any) -> str:
+    """Return a label of a run.
 
     Parameters
     ----------
-    run : RunResults
-        Or anything with the same fields.
+    name : str
+        Of a registered label.
+    run : RunAnswer
 
     Returns
     -------
-    dict of str to str
-        By name.
+    str
     """
-    return {name: _FUNCTIONS[name](run) for name in LABELS}
+    return _FUNCTIONS[name](run)
 
 
 add_label("outcome", lambda run: str(run.outcome))
+add_label("configuration", lambda run: str(run.configuration or run.outcome))

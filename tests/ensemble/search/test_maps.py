@@ -8,7 +8,6 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from subprocess import DEVNULL, CompletedProcess, Popen
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -29,8 +28,8 @@ from ensemble.search.map_refinement import Cell, MapRefinement, beside_changes
 from ensemble.search.task_queue import RunAnswer
 from ensemble.store import Store
 from ensemble.store.merge import merge
-from solver.analysis.run import Outcome
-from solver.analysis.run_labels import LABELS, add_label, labels_of
+from solver.analysis.run import Configuration, Outcome
+from solver.analysis.run_labels import LABELS, add_label, label_of
 from solver.scene import Scene, Shear
 from tests.conftest import ENSEMBLE
 from tests.ensemble.runs import shear_run
@@ -98,7 +97,7 @@ def outcome(scene: Scene) -> Outcome:
 
 
 def answer(task: MapRun) -> RunAnswer:
-    return RunAnswer(outcome(task.scene), labels={"outcome": outcome(task.scene)})
+    return RunAnswer(outcome(task.scene))
 
 
 def drawn(known: dict[str, RunAnswer], workers: int = 1) -> tuple[MapRecord, list[MapRun]]:
@@ -190,7 +189,7 @@ def test_the_command_draws_from_runs_that_the_store_has(
             {"axes.1.resolution": 0.001},
             r"axes\.1\.resolution: 0\.001 — input should be greater",
         ),
-        ({"label": "color"}, "label: 'color' — input should be 'outcome'"),
+        ({"label": "color"}, "label: 'color' — input should be 'outcome' or 'configuration'"),
         ({"axes.0.limits": [-1.0, 0.5]}, r"flow\.rate: "),
     ],
 )
@@ -200,10 +199,11 @@ def test_what_is_no_map_is_refused(change: dict[str, Any], message: str) -> None
 
 
 def test_cells_may_be_told_apart_by_another_label() -> None:
-    add_label("motion", lambda run: f"after-{run.time:.0f}")
+    assert label_of("configuration", RunAnswer(Outcome.BOUND, False, Configuration.ROLLING)) == "rolling"
+    assert label_of("configuration", RunAnswer(Outcome.SEPARATED)) == "separated"
+    add_label("motion", lambda run: f"sensitive-{run.sensitive}")
     try:
-        run = SimpleNamespace(outcome="bound", time=7.2)
-        assert labels_of(run) == {"outcome": "bound", "motion": "after-7"}
+        assert label_of("motion", RunAnswer(Outcome.BOUND)) == "sensitive-False"
         assert load(OutcomeMap, "shear-hamaker-map", {"label": "motion"}).label == "motion"
     finally:
         LABELS.remove("motion")
