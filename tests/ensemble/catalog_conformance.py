@@ -261,7 +261,8 @@ class CatalogConformance:
     def test_a_record_is_the_json_of_its_model(self, filled: Store) -> None:
         for summary in filled.summaries():
             assert json.loads(filled.run_record(summary.key).json) == summary.document()
-            assert filled.answer(summary.key) == (summary.outcome, summary.sensitive)
+            expected = (summary.outcome, summary.sensitive, summary.configuration)
+            assert filled.answer(summary.key) == expected
 
     def test_what_is_not_there_is_said_so(self, store: Store) -> None:
         for ask in (store.summary, store.run_record, store.boundary, store.boundary_record):

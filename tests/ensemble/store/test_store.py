@@ -305,7 +305,7 @@ def test_staging_alone_makes_nothing_exist(store: Store) -> None:
     assert not store.contains(staged.key)
     assert store.summaries() == []
     assert store.commit(staged) == staged.key
-    assert store.answer(staged.key) == (Outcome.BOUND, False)
+    assert store.answer(staged.key) == (Outcome.BOUND, False, None)
 
 
 def test_second_commit_of_a_key_keeps_the_first_run(store: Store) -> None:
