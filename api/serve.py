@@ -7,10 +7,12 @@ import contextlib
 import gc
 import logging
 import math
+import signal
 import subprocess
 import sys
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import AbstractAsyncContextManager, ExitStack, asynccontextmanager, contextmanager
+from typing import NoReturn
 
 import uvicorn
 from anyio import to_thread
@@ -74,7 +76,15 @@ def serve(settings: Settings, host: str, port: int, workers: int) -> None:
                 "make one with `ensemble token create`"
             )
         app = create_app(service, lifespan=_with_workers(service, workers))
+        for number in (signal.SIGTERM, signal.SIGINT):
+            signal.signal(number, _end)
         uvicorn.Server(server_configuration(app, settings, host, port)).run()
+
+
+def _end(*_: object) -> NoReturn:
+    """End the process, before the server takes signals or when it has shut down and raises them again."""
+    log.info("Stopped; jobs that wait or have begun go on when the service is started again.")
+    raise SystemExit(0)
 
 
 @contextmanager

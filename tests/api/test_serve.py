@@ -94,6 +94,9 @@ def test_no_process_is_left_however_the_server_ends(store, number):
             server.process.wait(SECONDS)
         wait_until(lambda: not alive(family), SECONDS_TO_DIE)
         assert "Traceback" not in server.logged()
+        if number != signal.SIGKILL:
+            assert server.process.returncode == 0
+            assert "go on when the service is started again" in server.logged()
     with service(store, "--workers=0") as again:
         unfinished = httpx2.get(f"{again.url}/jobs/{job['id']}").json()
         assert not unfinished["finished"], "a worker can continue it"
