@@ -67,6 +67,15 @@ def _no_limits(curves: int) -> Array:
     return np.full(curves, np.inf)
 
 
+@cache
+def _nothing_refined(count: int, curves: int, points: int) -> Refinement:
+    """Return the refinement with the factor 1 for all points and every other curve."""
+    pairs = all_pairs(count, curves)
+    groups = np.array([[target, source, 1] for target, source in pairs if target != source])
+    rows, starts = np.tile(np.arange(points), len(groups)), points * np.arange(len(groups) + 1)
+    return Refinement(groups, rows, starts, interpolations(points, 1))
+
+
 class Closeness:
     """Distances between all membranes of a geometry.
 
@@ -107,6 +116,8 @@ class Closeness:
         while factor < MAXIMUM_FACTOR and factor * self.nearest < ratio:
             factor *= 2
         count, curves, points = self.distances.shape
+        if factor == 1 and limits is None:
+            return _nothing_refined(count, curves, points)
         limits = _no_limits(curves) if limits is None else limits
         pairs = all_pairs(count, curves)
         groups, rows, starts = group_targets(pairs, self.distances.reshape(-1, points), ratio, limits)

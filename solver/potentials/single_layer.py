@@ -108,7 +108,7 @@ class SingleLayer:
         stokeslets.complete_self_parts(
             self._correction, self._diagonal, geometry.tangents, components, own.start
         )
-        if refinement:
+        if refinement and refinement.largest_factor > 1:
             refinement = within(refinement, own, size)
             refine_single_layer(geometry.curve_points, refinement, components, own.start)
             if refinement.largest_factor > LARGEST_REFINED:
