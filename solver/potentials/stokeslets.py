@@ -204,17 +204,24 @@ def distances(targets: Array, sources: Array, tangents: Array, spacing: float, o
     out : (m,)
         Written to.
     """
+    widest_vectors()
     source_x, source_y = sources[0], sources[1]
     squares = np.empty(source_x.size)
+    # Numbers that are not negative are in the order of their bits.  Among integers the least one, and where it
+    # is, are found by SIMD code, in any order of comparison; among floating-point numbers they are not.
+    bits, last = squares.view(np.int64), squares.size - 1
     for i in range(targets.shape[1]):
         xi, yi = targets[0, i], targets[1, i]
         for j in range(squares.size):
             dx, dy = xi - source_x[j], yi - source_y[j]
             squares[j] = dx * dx + dy * dy
-        at, nearest = 0, np.inf
+        least = bits[0]
         for j in range(squares.size):
-            if squares[j] < nearest:
-                at, nearest = j, squares[j]
+            least = min(least, bits[j])
+        at = last
+        for j in range(squares.size):
+            at = min(at, j if bits[j] == least else last)
+        nearest = squares[at]
         along = abs((xi - source_x[at]) * tangents[0, at] + (yi - source_y[at]) * tangents[1, at])
         inside = min(along, 0.5 * spacing)
         out[i] = np.sqrt(max(nearest - along * along, 0.0) + (along - inside) ** 2)
