@@ -6,8 +6,7 @@ Quasi-constant step size, with the NDF modification; the Jacobian is kept until 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,8 +47,7 @@ _SLOW = 0.1
 _SHRINK, _GROW = 0.2, 10.0  # limits of the factor from one step size to the next
 
 
-@dataclass(frozen=True)
-class _Solution:
+class _Solution(NamedTuple):
     """What Newton's iteration found.
 
     Attributes

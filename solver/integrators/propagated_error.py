@@ -17,7 +17,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,8 +42,7 @@ _PROBED_EVERY = 3  # steps; more often costs more and, measured over eight scene
 _LEAST_PROBE, _LARGEST_PROBE = 1e-3, 1e-2
 
 
-@dataclass(frozen=True)
-class LinearizedStep:
+class LinearizedStep(NamedTuple):
     """A step of y − y_predicted + Σₘ wₘ ∇ᵐy = c·f(y), with a linear f.
 
     Attributes
@@ -67,8 +66,7 @@ class LinearizedStep:
     solve: Callable[[Array], Array]
 
 
-@dataclass(frozen=True)
-class Evaluation:
+class Evaluation(NamedTuple):
     """A rate that is known.
 
     Attributes

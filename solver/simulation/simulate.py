@@ -170,8 +170,7 @@ class Simulation:
         -------
         Run
         """
-        self.finish(after_step)
-        return self.run()
+        return self._recorded(self.finish(after_step))
 
     def finish(self, after_step: Callable[[Simulation], None] | None = None) -> RunResults:
         """Take all steps that are left, and return what the run came to.
@@ -222,9 +221,7 @@ class Simulation:
         ValueError
             If it is not done, or another sink has what it recorded.
         """
-        if not isinstance(self._sink, InMemory):
-            raise ValueError("what the run recorded is in the sink that the simulation was given")
-        return self._sink.run(self.results())
+        return self._recorded(self.results())
 
     def saved(self) -> Saved:
         """Return everything that decides the steps to come.
@@ -290,6 +287,12 @@ class Simulation:
             simulation._loop.restore(saved["loop"])
             simulation._sink.restore(saved["sink"])  # last: one that fails leaves it as it is
         return simulation
+
+    def _recorded(self, results: RunResults) -> Run:
+        """Put the results and what was recorded together."""
+        if not isinstance(self._sink, InMemory):
+            raise ValueError("what the run recorded is in the sink that the simulation was given")
+        return self._sink.run(results)
 
     @property
     def _elapsed(self) -> float:
