@@ -147,6 +147,7 @@ def work(groups: Groups, store: StoreOnRank) -> None:
 
 def _lead(groups: Groups, leaders: Intracomm, store: StoreOnRank) -> None:
     _send(leaders, Ready(), 0, _REPORTS)
+    first = True
     while True:
         order = _wait(leaders)
         # An order that crossed the report of the run that it means has nothing left to stop.
@@ -156,7 +157,8 @@ def _lead(groups: Groups, leaders: Intracomm, store: StoreOnRank) -> None:
             _send(groups.group, order, follower, _ORDERS)
         if isinstance(order, Stop):
             return
-        _send(leaders, _simulate(groups, leaders, store, order), 0, _REPORTS)
+        _send(leaders, _simulate(groups, leaders, store, order, first), 0, _REPORTS)
+        first = False
 
 
 def _follow(groups: Groups) -> None:
@@ -174,9 +176,12 @@ def _wait(communicator: Intracomm) -> DispatcherOrder:
     return cast(DispatcherOrder, received[0])
 
 
-def _simulate(groups: Groups, leaders: Intracomm, store: StoreOnRank, task: Task) -> WorkerReport:
+def _simulate(
+    groups: Groups, leaders: Intracomm, store: StoreOnRank, task: Task, first: bool
+) -> WorkerReport:
     # A study whose answers are all in the store never needs the compiled kernels.
     from ensemble.mpi.checkpointed_run import CheckpointKeeper, Order, Stopped, checkpointed_run
+    from solver.simulation.preparation import compile_for
 
     def order() -> Order:
         # While a run goes on nobody orders another one; a cancellation may be late and name an earlier run.
@@ -188,6 +193,8 @@ def _simulate(groups: Groups, leaders: Intracomm, store: StoreOnRank, task: Task
         return Order.GO_ON
 
     begin = time.perf_counter()
+    if first and leaders.size > 1:
+        compile_for(task.scene, leaders.rank)
     keeper = CheckpointKeeper(store.checkpoint(task.scene), order)
     try:
         run = checkpointed_run(task.scene, groups.parallel, keeper.record, keeper)
