@@ -114,5 +114,10 @@ def interpolant(table: Array, order: int, time: float, size: float) -> Callable[
     callable
         From a time to the value there, (...).
     """
-    kept = table[: order + 1].copy()
-    return lambda instant: combined(np.array(_newton_weights(order, (instant - time) / size)), kept)
+    rows, shape = table[: order + 1].reshape(order + 1, -1).copy(), table.shape[1:]
+
+    def at(instant: float) -> Array:
+        weights = np.array(_newton_weights(order, (instant - time) / size))
+        return np.asarray(weights @ rows).reshape(shape)
+
+    return at

@@ -207,8 +207,8 @@ def distances(targets: Array, sources: Array, tangents: Array, spacing: float, o
     widest_vectors()
     source_x, source_y = sources[0], sources[1]
     squares = np.empty(source_x.size)
-    # Numbers that are not negative are in the order of their bits.  Among integers the least one, and where it
-    # is, are found by SIMD code, in any order of comparison; among floating-point numbers they are not.
+    # Numbers that are not negative are in the order of their bits.  The least one of integers, and where it
+    # is, are found by SIMD code; of floating-point numbers they are not.
     bits, last = squares.view(np.int64), squares.size - 1
     for i in range(targets.shape[1]):
         xi, yi = targets[0, i], targets[1, i]

@@ -47,7 +47,7 @@ def compile_for(scene: Scene, process: int) -> None:
 
 
 def _parts(scene: Scene) -> list[Callable[[], object]]:
-    """Return what compiles the functions of a run; the first two parts take as long as the others together."""
+    """Return what compiles the functions of a run, in parts."""
     equation, state = dense_equation(scene), placed_state(scene)
     membranes, adhesion = equation.membranes, equation.adhesion
     geometry = Geometry(membranes, state)

@@ -20,7 +20,8 @@ def ready():
     return {(each.py_func.__name__, str(types)) for each in dispatchers for types in each.overloads}
 
 pair = uneven_pair(horizon=0.1, flow=Shear(rate=0.5))
-scene = pair if "pair" in sys.argv else pair.model_copy(update={"vesicles": pair.vesicles[:1], "adhesion": None})
+one = pair.model_copy(update={"vesicles": pair.vesicles[:1], "adhesion": None})
+scene = pair if "pair" in sys.argv else one
 compile_for(scene, process=1)
 before = ready()
 assert before
