@@ -53,7 +53,7 @@ def summed(scene: Scene, parallel: Parallel) -> tuple[Array, Array]:
 
 def summary(run: Run) -> Array:
     """What a run says, and the states that it recorded, as numbers."""
-    said = [run.period or 0.0, run.time, *run.energy.__dict__.values(), run.work.steps]
+    said = [run.period or 0.0, run.time, run.energy.bending, run.energy.adhesion or 0.0, run.work.steps]
     return np.concatenate(
         [said, *(values.ravel() for values in (run.frames.center, run.frames.tangent_angle))]
     )
