@@ -56,9 +56,11 @@ export async function showRuns({ content, query, signal }) {
 }
 
 /** @param {any} run */
-function row({ key, outcome, scene, time, created, work, report }) {
+function row({ key, outcome, configuration, scene, time, created, work, report }) {
   return tableRow(COLUMNS, [
-    outcomeLabel(outcome),
+    configuration
+      ? [outcomeLabel(outcome), element("span", { class: "note" }, `, ${configuration}`)]
+      : outcomeLabel(outcome),
     report ? [describe(scene), element("span", { class: "note" }, `, for the report ${report}`)] : describe(scene),
     scene.numerics.integrator,
     number(work.points),
