@@ -236,7 +236,7 @@ class _Unpickler(pickle.Unpickler):
     """Unpickles compiled code without the modules of Numba that only compilation needs.
 
     Code refers to an `Environment` of each function in it, with the globals of its module.  Those of Numba's
-    own functions are never read, but to import their modules takes a quarter of the start of a run.
+    own functions are never read, but to import their modules takes a tenth of the start of a run.
     """
 
     def find_class(self, module_name: str, global_name: str) -> Any:
