@@ -25,6 +25,7 @@ _NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
 _NAME = r"[^\W\d_]+(?:(?:\^|\*\*)-?\d)?"
 _QUANTITY = re.compile(rf"({_NUMBER})\s*((?:1?\s*/\s*)?{_NAME}(?:\s*[*·/ ]\s*{_NAME}){{0,5}})")
 _BEGINNING = re.compile(rf"\s*{_NUMBER}\s*(?:1\s*)?[^\d\s.]")
+_DECIMAL_COMMA = re.compile(r"(?<=\d),(?=\d)")
 _LONGEST = 100  # characters of a number with a unit
 
 # Pint keeps what it has made of each unit, over a kilobyte.  Its registry takes a fifth of a second to make.
@@ -109,7 +110,10 @@ class Dimension:
         if self.is_pure:
             return value
         if units is None:
-            raise ValueError("a unit needs the table units of the scene")
+            raise ValueError(
+                "a unit needs those of the scene: units.radius (or units.length), units.bending_modulus and "
+                "units.viscosity"
+            )
         return rounded(value / units.scale(self))
 
     def validate(self, value: Any, handler: Callable[[Any], Any], info: ValidationInfo) -> Any:
@@ -217,7 +221,7 @@ def si_value(text: str, si: str, name: str) -> float:
     example = f"must be a number with a unit of {name}, such as '0.5 {si}'"
     match = _quantity(text)
     if match is None:
-        raise ValueError(example)
+        raise ValueError(decimal_point_wanted(text) or example)
     from pint import DimensionalityError, UndefinedUnitError
 
     number, unit = match.groups()
@@ -230,6 +234,26 @@ def si_value(text: str, si: str, name: str) -> float:
         raise ValueError(f"{example}, got {error.dim1}") from None
     except Exception as error:  # units that no product may have, such as those of temperatures with offsets
         raise ValueError(f"{example}: {error}") from None
+
+
+def decimal_point_wanted(text: str) -> str | None:
+    """Say what to write instead of a number with a decimal comma.
+
+    Parameters
+    ----------
+    text : str
+        Such as ``0,5`` or ``0,5 1/s``.
+
+    Returns
+    -------
+    str or None
+        None if it would be no number with a decimal point either.
+    """
+    if len(text) > _LONGEST or len(_DECIMAL_COMMA.findall(text)) != 1:
+        return None
+    written = _DECIMAL_COMMA.sub(".", text.strip())
+    is_number = re.fullmatch(_NUMBER, written) or _quantity(written)
+    return f"write a decimal point: {written!r}" if is_number else None
 
 
 def is_quantity(text: str) -> bool:

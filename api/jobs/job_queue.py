@@ -308,7 +308,7 @@ class Jobs:
             If there is none.
         """
         unfinished = update(JobRow).where(JobRow.id == identifier, JobRow.status.in_(UNFINISHED))
-        self._change(self._ended(unfinished, JobStatus.DISMISSED, "dismissed"))
+        self._change(self._ended(unfinished, JobStatus.DISMISSED, "canceled"))
         return self.get(identifier)
 
     def lease(self, worker: str) -> Lease | None:

@@ -13,6 +13,7 @@ from api.http.paging import After, CollectionPage, Limit, Where, page_response
 from api.http.problems import documented
 from api.results.boundary_values import BoundaryDocument, fitted_boundary
 from api.results.downloads import MEDIA_TYPES, BoundaryFile, boundary_table, file_response
+from api.results.scene_units import SceneUnits
 from api.routes.service import Reader
 from api.routes.streaming import as_file, stream_file
 from ensemble.errors import BadInput
@@ -165,6 +166,29 @@ def get_critical_value(
         name: _number(name, text) for name, text in request.query_params.multi_items() if name != "method"
     }
     return critical_value_at(boundary, parameters, method)
+
+
+@router.get("/{key}/units", responses=documented(HTTPStatus.NOT_FOUND))
+def get_units(reader: Reader, key: StudyKey) -> SceneUnits:
+    """Say how much one is of every number of a boundary, and of its runs, that has a unit.
+
+    Parameters
+    ----------
+    reader : Caller
+    key : str
+        Key of the study.
+
+    Returns
+    -------
+    SceneUnits
+
+    Raises
+    ------
+    NotStored
+        If there is no boundary of this key.
+    """
+    boundary = reader.service.store.boundary(key)
+    return SceneUnits.of(boundary.scene, (*boundary.swept, boundary.searched))
 
 
 @router.get(

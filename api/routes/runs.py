@@ -14,6 +14,7 @@ from api.http.problems import documented
 from api.results.downloads import RunFile, file_response
 from api.results.flow_field import FlowField, flow_field
 from api.results.run_arrays import FramesDocument, FrameSelection, SeriesDocument, SeriesSelection, centers
+from api.results.scene_units import SceneUnits
 from api.routes.service import Reader
 from api.routes.streaming import as_file, stream, stream_file
 from ensemble.store.filters import without_reports
@@ -217,6 +218,31 @@ def get_flow(request: Request, reader: Reader, key: RunKey) -> Response:
         return json_response("null" if field is None else field)
 
     return cached_response(request, etag(key, "flow"), IMMUTABLE, make)
+
+
+@router.get("/{key}/units", response_model=SceneUnits, responses=RUN_RESPONSES)
+def get_units(request: Request, reader: Reader, key: RunKey) -> Response:
+    """Say how much one is of every number of a run that has a unit.
+
+    Parameters
+    ----------
+    request : Request
+    reader : Caller
+    key : str
+
+    Returns
+    -------
+    Response
+
+    Raises
+    ------
+    NotStored
+        If there is no run of this key.
+    """
+    scene = reader.service.store.summary(key).scene
+    return cached_response(
+        request, etag(key, "units"), IMMUTABLE, lambda: json_response(SceneUnits.of(scene))
+    )
 
 
 @router.get("/{key}/file", responses=RUN_RESPONSES | file_response(RunFile))

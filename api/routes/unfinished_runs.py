@@ -12,6 +12,7 @@ from pydantic import BaseModel
 from api.http.caching import JSON, json_response
 from api.http.problems import documented
 from api.results.run_arrays import SeriesDocument, SeriesSelection, UnfinishedSeries
+from api.results.scene_units import SceneUnits
 from api.routes.runs import MAXIMUM_NUMBER, RunKey, SeriesNames, Start, Stop, Stride
 from api.routes.service import Reader, Service
 from api.routes.streaming import stream
@@ -120,6 +121,29 @@ def get_unfinished_series(
     numbers = range(start, stop, stride)
     selection = SeriesSelection.of(arrays, name, numbers, reader.service.settings.frame_values)
     return stream(reader, request, selection.json(), JSON)
+
+
+@router.get("/{key}/units", response_model=SceneUnits, responses=_RESPONSES)
+def get_units_of_unfinished_run(reader: Reader, key: RunKey) -> Response:
+    """Say how much one is of every number of a run that has a unit.
+
+    Parameters
+    ----------
+    reader : Caller
+    key : str
+
+    Returns
+    -------
+    Response
+
+    Raises
+    ------
+    NotStored
+        If no run of this key has a checkpoint.
+    UnfinishedRunError
+        If what is kept of the run cannot be used; the answer says to ask again, or that it begins anew.
+    """
+    return json_response(SceneUnits.of(_found(reader.service, key).scene))
 
 
 def _found(service: Service, key: str) -> UnfinishedRun:

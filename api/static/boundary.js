@@ -9,9 +9,10 @@ import { ends, interval, number } from "./format.js";
 import { outcomeLabel } from "./outcomes.js";
 import { Plot } from "./plot.js";
 import { alertAbout } from "./problems.js";
-import { goTo } from "./router.js";
+import { goTo, runLink } from "./router.js";
 import { surfaceCurves, surfaceMap } from "./surface.js";
 import { describe, quantity, valueAt } from "./symbols.js";
+import { Units } from "./units.js";
 
 /**
  * @typedef {import("./diagram.js").Boundary} Boundary
@@ -35,10 +36,12 @@ const CONVERGED = "converged";
  */
 export async function followBoundary(place, key, signal, compared = null) {
   const marks = new Marks(key, signal);
+  /** @type {BoundaryView | null} */
   let view = null;
   for await (const boundary of changesOf(`/boundaries/${key}`, SECONDS_BETWEEN_REQUESTS, signal)) {
+    marks.units ??= await Units.of(`/boundaries/${key}`, boundary.study.scene, signal);
     const runs = await marks.of(boundary);
-    view ??= new BoundaryView(place, signal, compared);
+    view ??= new BoundaryView(place, signal, compared, marks.units);
     view.show(boundary, runs);
   }
 }
@@ -55,6 +58,8 @@ class Marks {
   constructor(boundary, signal) {
     this.boundary = boundary;
     this.signal = signal;
+    /** @type {Units | null} */
+    this.units = null;
   }
 
   /**
@@ -63,7 +68,6 @@ class Marks {
    */
   async of(boundary) {
     const paths = pathsOf(boundary);
-    const symbols = symbolsOf(boundary);
     const keys = boundary.points.flatMap((point) => point.runs);
     if (!keys.every((key) => this.#summaries.has(key))) {
       for (const run of await getAll(`/boundaries/${this.boundary}/runs?limit=${RUNS_AT_ONCE}`, this.signal)) {
@@ -74,7 +78,7 @@ class Marks {
     return runs.map((run) => {
       const values = paths.map((path) => valueAt(run.scene, path));
       const at = values.slice(0, -1);
-      const text = textOf(run, values, symbols);
+      const text = textOf(run, values, paths, boundary, this.units ?? new Units());
       return { key: run.key, outcome: run.outcome, at, x: at[0], y: values[at.length], text };
     });
   }
@@ -99,16 +103,20 @@ function symbolsOf(boundary) {
  *
  * @param {any} run
  * @param {number[]} values
- * @param {string[]} symbols
+ * @param {string[]} paths - Of the values.
+ * @param {Boundary} boundary
+ * @param {Units} units
  */
-function textOf({ outcome, failure, period, gap, error, work }, values, symbols) {
+function textOf({ outcome, failure, period, gap, error, work }, values, paths, boundary, units) {
   const known = (/** @type {string} */ name, /** @type {any} */ value, /** @type {any} */ uncertainty) =>
     typeof value === "number"
-      ? [`${name} ${number(value)}${typeof uncertainty === "number" ? ` ± ${number(uncertainty, 1)}` : ""}`]
+      ? [`${name} ${units.both(name, value, (shown) => withUncertainty(shown, (uncertainty * shown) / value))}`]
       : [];
   return [
     `${outcome}${failure ? `: ${failure.replaceAll("<", "‹")}` : ""}`,
-    symbols.map((symbol, index) => `${symbol} = ${number(values[index])}`).join(", "),
+    symbolsOf(boundary)
+      .map((symbol, index) => `${symbol} = ${units.both(paths[index], values[index])}`)
+      .join(", "),
     ...known("period", period, error.period),
     ...known("gap", gap, null),
     ...known("position error", error.global, null),
@@ -117,19 +125,29 @@ function textOf({ outcome, failure, period, gap, error, work }, values, symbols)
   ];
 }
 
+/**
+ * @param {number} value
+ * @param {number} uncertainty - NaN if it is not known.
+ */
+function withUncertainty(value, uncertainty) {
+  return uncertainty > 0 ? `${number(value)} ± ${number(uncertainty, 1)}` : number(value);
+}
+
 class BoundaryView {
   /**
    * @param {HTMLElement} place
    * @param {AbortSignal} signal
    * @param {Boundary | null} compared
+   * @param {Units} units
    */
-  constructor(place, signal, compared) {
+  constructor(place, signal, compared, units) {
     this.signal = signal;
+    this.units = units;
     this.compared = compared;
     this.heading = element("div", { class: "heading" });
     this.figure = element("div", { class: "plot diagram", role: "application", tabindex: 0 });
     this.status = element("p", { class: "note", role: "status" });
-    this.map = element("div", { class: "plot", role: "application" });
+    this.map = element("div", { class: "plot" });
     this.points = element("section", { "aria-label": "Points of the boundary" });
     this.runs = element("details", { class: "runs" });
     this.reading = element("section", {});
@@ -167,12 +185,12 @@ class BoundaryView {
         "p",
         {},
         element("code", {}, boundary.name),
-        `: ${describe(boundary.study.scene, pathsOf(boundary))}`,
+        `: ${describe(boundary.study.scene, pathsOf(boundary), this.units)}`,
       ),
     );
     this.figure.setAttribute("aria-label", summary(boundary, marks));
     this.#draw(boundary, marks);
-    this.points.replaceChildren(pointsTable(boundary, marks));
+    this.points.replaceChildren(pointsTable(boundary, marks, this.units));
     if (!this.files.hasChildNodes()) {
       const key = boundary.study_key;
       const formats = /** @type {[string, string][]} */ ([
@@ -192,15 +210,16 @@ class BoundaryView {
   #draw(boundary, marks) {
     const [, ...others] = sweepsOf(boundary.study);
     if (others.length === 0) {
-      void this.plot.draw(() => phaseDiagram(boundary, marks, this.compared));
+      void this.plot.draw(() => phaseDiagram(boundary, marks, this.compared, this.units));
       this.keys ??= new DiagramKeys(this.plot, this.status);
       this.keys.follow(marks);
       return;
     }
-    void this.plot.draw(() => surfaceCurves(boundary));
+    void this.plot.draw(() => surfaceCurves(boundary, this.units));
     if (others.length === 1) {
+      this.map.setAttribute("role", "application");
       this.map.setAttribute("aria-label", `Map. ${titleOf(boundary)}`);
-      void this.mapPlot.draw(() => surfaceMap(boundary));
+      void this.mapPlot.draw(() => surfaceMap(boundary, this.units));
     }
   }
 
@@ -209,10 +228,11 @@ class BoundaryView {
    * @param {Mark[]} marks
    */
   #showRuns(boundary, marks) {
+    const paths = pathsOf(boundary);
     const rows = marks.map(({ key, at, y, outcome }) => [
-      ...[...at, y].map((value) => number(value)),
+      ...[...at, y].map((value, index) => this.units.both(paths[index], value)),
       outcomeLabel(outcome),
-      element("a", { href: `#/runs/${key}` }, "Play"),
+      runLink(key),
     ]);
     this.runs.replaceChildren(
       element("summary", {}, `All ${marks.length} runs`),
@@ -226,7 +246,7 @@ class BoundaryView {
     if (this.reading.hasChildNodes() || converged.length < 2) {
       return;
     }
-    this.reading.append(...readingForm(boundary, this.signal));
+    this.reading.append(...readingForm(boundary, this.units, this.signal));
   }
 }
 
@@ -251,14 +271,17 @@ function summary(boundary, marks) {
 /**
  * @param {Boundary} boundary
  * @param {Mark[]} marks
+ * @param {Units} units
  */
-function pointsTable(boundary, marks) {
-  const symbols = symbolsOf(boundary);
+function pointsTable(boundary, marks, units) {
+  const [symbols, paths] = [symbolsOf(boundary), pathsOf(boundary)];
+  const size = units.size(paths[paths.length - 1]);
   const rows = boundary.points.map((point) => [
-    ...placeOf(point, boundary).map((value) => number(value)),
+    ...placeOf(point, boundary).map((value, index) => units.both(paths[index], value)),
     [point, ...otherChanges(point)].flatMap(({ bracket }, index) => [
       index > 0 ? "; also " : "",
       bracketLinks(bracket, placeOf(point, boundary), marks),
+      measuredInterval(bracket, size),
     ]),
     element("span", { class: `state ${stateOf(point)}` }, point.certified ? "certified" : point.status),
     scannedText(point),
@@ -288,6 +311,18 @@ function bracketLinks(bracket, place, marks) {
     return mark ? element("a", { href: `#/runs/${mark.key}`, title: mark.outcome }, text) : text;
   });
   return [links[0], " – ", links[1]];
+}
+
+/**
+ * Write what follows a bracket: in brackets the same with its unit, if it has one that is known.
+ *
+ * @param {[number | null, number | null]} bracket
+ * @param {import("./units.js").Size} size
+ */
+function measuredInterval(bracket, { value, unit }) {
+  const [low, high] = bracket.map((end) => (end === null ? null : end * value));
+  const isKnown = unit && (low !== null || high !== null);
+  return isKnown ? ` (${interval([low, high])} ${unit})` : "";
 }
 
 /**
@@ -325,16 +360,19 @@ function stateOfAll(points) {
  * Make a form that reads a critical value at values of the swept parameters.
  *
  * @param {Boundary} boundary
+ * @param {Units} units
  * @param {AbortSignal} signal
  */
-function readingForm(boundary, signal) {
+function readingForm(boundary, units, signal) {
   const { scene, search } = boundary.study;
-  const searched = quantity(search.parameter, scene);
+  const [searched, size] = [quantity(search.parameter, scene), units.size(search.parameter)];
   const inputs = sweepsOf(boundary.study).map(({ parameter }, index) => {
     const { name, symbol } = quantity(parameter, scene);
     const id = `reading-at-${index}`;
     const input = element("input", { id, name: parameter, type: "number", step: "any", required: true });
-    return { input, label: element("label", { for: id }, `${index > 0 ? "and" : "At"} ${name} ${symbol}`) };
+    const { value, unit } = units.size(parameter);
+    const label = `${index > 0 ? "and" : "At"} ${name} ${symbol}${unit && ` in ${number(value)} ${unit}`}`;
+    return { input, label: element("label", { for: id }, label) };
   });
   const answer = element("div", { "aria-live": "polite" });
 
@@ -349,8 +387,8 @@ function readingForm(boundary, signal) {
       );
       answer.replaceChildren(
         definitions([
-          [`Critical ${searched.symbol}`, number(critical_value)],
-          ["Between", interval(uncertainty)],
+          [`Critical ${searched.symbol}`, units.both(search.parameter, critical_value)],
+          ["Between", interval(uncertainty) + measuredInterval(uncertainty, size)],
           ["Method", method],
         ]),
       );

@@ -10,8 +10,13 @@ import { MARKS } from "./outcomes.js";
 import { axis } from "./plot.js";
 import { quantity } from "./symbols.js";
 import { color } from "./theme.js";
+import { inUnits } from "./units.js";
 
-/** @typedef {import("./plot.js").Figure} Figure */
+/**
+ * @typedef {import("./plot.js").Figure} Figure
+ * @typedef {import("./units.js").Size} Size
+ * @typedef {import("./units.js").Units} Units
+ */
 
 /**
  * @typedef {object} Point - Of a boundary.
@@ -50,16 +55,18 @@ const LAST_IN_LEGEND = 2000; // the default of Plotly is 1000
  * @param {Boundary} boundary
  * @param {Mark[]} marks
  * @param {Boundary | null} compared
+ * @param {Units} units
  * @returns {Figure}
  */
-export function phaseDiagram(boundary, marks, compared) {
+export function phaseDiagram(boundary, marks, compared, units) {
   const { scene, search } = boundary.study;
-  const x = quantity(sweepsOf(boundary.study)[0].parameter, scene);
-  const y = quantity(search.parameter, scene);
+  const [across, up] = [sweepsOf(boundary.study)[0].parameter, search.parameter];
+  const [x, y] = [quantity(across, scene), quantity(up, scene)];
+  const sizes = { x: units.size(across), y: units.size(up) };
   const points = bracketed(boundary);
-  return {
+  const figure = {
     data: [
-      ...fitLine(boundary, points, x.symbol, y.symbol),
+      ...fitLine(boundary, points, x.symbol, y.symbol, sizes),
       ...(compared ? comparedBoundary(compared) : []),
       ...runs(marks),
       ...brackets(boundary, points),
@@ -68,8 +75,8 @@ export function phaseDiagram(boundary, marks, compared) {
     layout: {
       height: 480,
       margin: { l: 64, r: 16, t: 12, b: 56 },
-      xaxis: axis({ title: { text: title(x), standoff: 12 }, range: range(boundary, marks, compared) }),
-      yaxis: axis({ title: { text: title(y), standoff: 12 }, rangemode: "normal" }),
+      xaxis: axis({ title: { text: units.label(title(x), across), standoff: 12 }, range: range(boundary, marks, compared) }),
+      yaxis: axis({ title: { text: units.label(title(y), up), standoff: 12 }, rangemode: "normal" }),
       legend: {
         orientation: "h",
         x: 0,
@@ -80,6 +87,7 @@ export function phaseDiagram(boundary, marks, compared) {
       hovermode: "closest",
     },
   };
+  return inUnits(figure, sizes);
 }
 
 /**
@@ -285,15 +293,17 @@ function otherBrackets(boundary) {
  * @param {Point[]} points
  * @param {string} x
  * @param {string} y
+ * @param {{x: Size, y: Size}} sizes - Of the units in which the line is written.
  */
-function fitLine(boundary, points, x, y) {
+function fitLine(boundary, points, x, y, sizes) {
   const { fit } = boundary;
   if (fit === null || points.length === 0) {
     return [];
   }
   const ends = [points[0], points[points.length - 1]].map((point) => at(point, boundary));
   const sign = fit.intercept < 0 ? "−" : "+";
-  const line = `critical ${y} = ${number(fit.slope, 3)} ${x} ${sign} ${number(Math.abs(fit.intercept), 2)}`;
+  const [slope, intercept] = [(fit.slope * sizes.y.value) / sizes.x.value, Math.abs(fit.intercept) * sizes.y.value];
+  const line = `critical ${y} = ${number(slope, 3)} ${x} ${sign} ${number(intercept, 2)}`;
   return [
     {
       type: "scatter",

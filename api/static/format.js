@@ -88,7 +88,7 @@ export function duration(seconds) {
  */
 export function roughly(seconds) {
   if (seconds < 10) {
-    return "some seconds";
+    return "a few seconds";
   }
   /** @type {[string, number][]} */
   const units = [
@@ -98,7 +98,7 @@ export function roughly(seconds) {
     ["days", 86400],
   ];
   const [name, length] = units.filter(([, each]) => seconds >= 1.5 * each).pop() ?? units[0];
-  return `${number(seconds / length, seconds / length < 100 ? 2 : 3)} ${name}`;
+  return `about ${number(seconds / length, seconds / length < 100 ? 2 : 3)} ${name}`;
 }
 
 const moments = new Intl.DateTimeFormat(undefined, { dateStyle: "medium", timeStyle: "short" });

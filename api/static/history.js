@@ -1,11 +1,11 @@
 /** Plots of the diagnostics of a run against time, one below the other. */
 
-import { number } from "./format.js";
 import { axis } from "./plot.js";
 import { color } from "./theme.js";
 
 /**
  * @typedef {import("./plot.js").Figure} Figure
+ * @typedef {import("./units.js").Units} Units
  * @typedef {Record<string, (number | null)[]>} Series
  *
  * @typedef {object} Curve
@@ -84,9 +84,10 @@ const GAP = 0.42; // between panels, as a fraction of the height of one
 /**
  * @param {Series} series
  * @param {any} scene
+ * @param {Units} units
  * @returns {Figure}
  */
-export function histories(series, scene) {
+export function histories(series, scene, units) {
   const panels = PANELS.map((panel) => ({
     ...panel,
     curves: panel.curves.filter((curve) => curve.series in series),
@@ -101,18 +102,18 @@ export function histories(series, scene) {
     ];
   });
   return {
-    data: panels.flatMap((panel, index) => panel.curves.map((curve) => trace(series, panel, curve, index))),
+    data: panels.flatMap((panel, index) => panel.curves.map((curve) => trace(series, panel, curve, index, units))),
     layout: {
       ...Object.fromEntries(axes),
       height: PANEL_HEIGHT * (panels.length * (1 + GAP)) + 30,
       margin: MARGIN,
       xaxis: axis({
-        title: { text: "time t", standoff: 8 },
+        title: { text: units.label("time t", "time"), standoff: 8 },
         anchor: axisName("y", panels.length - 1),
         automargin: false,
       }),
-      annotations: panels.map((panel, index) => heading(panel, axes[index][1].domain[1])),
-      shapes: panels.flatMap((panel, index) => adhesionDistance(panel, scene, index)),
+      annotations: panels.map((panel, index) => heading(panel, axes[index][1].domain[1], units)),
+      shapes: panels.flatMap((panel, index) => adhesionDistance(panel, scene, index, units)),
       hovermode: "x",
     },
   };
@@ -133,8 +134,10 @@ function axisName(name, index) {
  *
  * @param {Panel} panel
  * @param {number} top
+ * @param {Units} units
  */
-function heading({ title, curves }, top) {
+function heading({ title: bare, curves }, top, units) {
+  const title = units.label(bare, curves[0].series);
   const names = curves.map(
     ({ name, color: of }) =>
       `<span style="color:${color(of)}">━</span> <span style="color:${color("muted")}">${name}</span>`,
@@ -158,13 +161,15 @@ function heading({ title, curves }, top) {
  * @param {Panel} panel
  * @param {any} scene
  * @param {number} index
+ * @param {Units} units
  */
-function adhesionDistance({ title }, scene, index) {
+function adhesionDistance({ title }, scene, index, units) {
   const distance = scene.adhesion?.distance;
   if (title !== "gap" || distance === undefined) {
     return [];
   }
-  const label = { text: `δ = ${number(distance)}`, textposition: "end", yanchor: "bottom", font: { size: 11 } };
+  const height = distance * units.size("gap").value;
+  const label = { text: `δ = ${units.both("gap", distance)}`, textposition: "end", yanchor: "bottom", font: { size: 11 } };
   return [
     {
       type: "line",
@@ -172,8 +177,8 @@ function adhesionDistance({ title }, scene, index) {
       x0: 0,
       x1: 1,
       yref: axisName("y", index),
-      y0: distance,
-      y1: distance,
+      y0: height,
+      y1: height,
       line: { color: color("muted"), width: 1, dash: "dot" },
       label: { ...label, font: { ...label.font, color: color("muted") } },
     },
@@ -185,18 +190,20 @@ function adhesionDistance({ title }, scene, index) {
  * @param {Panel} panel
  * @param {Curve} curve
  * @param {number} index
+ * @param {Units} units
  */
-function trace(series, panel, curve, index) {
-  const convert = panel.convert ?? ((/** @type {number} */ value) => value);
+function trace(series, panel, curve, index, units) {
+  const [time, size] = [units.size("time"), units.size(curve.series)];
+  const convert = panel.convert ?? ((/** @type {number} */ value) => value * size.value);
   return {
     type: "scatter",
     mode: "lines",
     name: curve.name,
-    x: series.time,
+    x: series.time.map((value) => value === null ? null : value * time.value),
     y: series[curve.series].map((value) => (value === null ? null : convert(value))),
     yaxis: axisName("y", index),
     showlegend: false,
     line: { color: color(curve.color), width: 1.5 },
-    hovertemplate: "%{y:.4g}",
+    hovertemplate: `%{y:.4g}${size.unit && ` ${size.unit}`}`,
   };
 }

@@ -62,6 +62,10 @@ export class FieldInput {
     this.input.setAttribute("aria-invalid", String(reason !== ""));
     this.refusal.textContent = reason;
     this.refusal.hidden = reason === "";
+    const part = this.element.closest("details");
+    if (reason && part) {
+      part.open = true;
+    }
   }
 }
 

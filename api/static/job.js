@@ -29,6 +29,15 @@ export function isUnfinished({ status }) {
   return status === "accepted" || status === "running";
 }
 
+/**
+ * The state of a job in the words of the page, which cancels what the standard of the service dismisses.
+ *
+ * @param {Job} job
+ */
+export function stateOf({ status }) {
+  return element("span", { class: `state ${status}` }, status === "dismissed" ? "canceled" : status);
+}
+
 /** @param {Job} job */
 export function progressOf({ progress }) {
   return element(
@@ -44,9 +53,9 @@ export function progressOf({ progress }) {
  *
  * @param {Job} job
  */
-export function resultLink({ kind, key, status }) {
+export function resultLink({ kind, key, status, progress }) {
   const { collection, answer_title: title, answer_grows: grows } = kindNamed(kind);
-  const exists = grows ? status !== "accepted" : status === "succeeded";
+  const exists = status === "succeeded" || (grows && status === "running" && progress > 0);
   return collection && exists
     ? element("a", { href: `#/${collection}/${key}` }, title.charAt(0).toUpperCase() + title.slice(1))
     : null;

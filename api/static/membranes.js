@@ -30,11 +30,13 @@ export class MembraneCanvas {
    * @param {Frames} frames
    * @param {import("./flow.js").ImposedFlow | null} flow - Null in a fluid at rest.
    * @param {any} scene - Of the run.
+   * @param {import("./units.js").Units} units - Of the scene.
    */
-  constructor(canvas, frames, flow, scene) {
+  constructor(canvas, frames, flow, scene, units) {
     this.canvas = canvas;
     this.context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
     this.flow = flow;
+    this.units = units;
     this.distance = scene.adhesion?.distance ?? null;
     this.longest = Math.max(...scene.vesicles.map((/** @type {any} */ { length }) => length));
     this.range = tensionRange(frames.states);
@@ -211,11 +213,12 @@ export class MembraneCanvas {
     context.font = this.style.font;
     context.textBaseline = "bottom";
     context.textAlign = "left";
-    context.fillText(number(this.range[0], 2), left, top - 3);
+    const [low, high] = this.range.map((end) => number(end * this.units.size("tension").value, 2));
+    context.fillText(low, left, top - 3);
     context.textAlign = "right";
-    context.fillText(number(this.range[1], 2), left + barWidth, top - 3);
+    context.fillText(high, left + barWidth, top - 3);
     context.textAlign = "center";
-    context.fillText("tension σ", left + barWidth / 2, top - 3);
+    context.fillText(this.units.label(barWidth < BAR.width ? "σ" : "tension σ", "tension"), left + barWidth / 2, top - 3);
   }
 
   /**
@@ -238,9 +241,10 @@ export class MembraneCanvas {
       context.fillText(text, start, y - 6);
       return start + Math.max(length, context.measureText(text).width) + 18;
     };
-    const next = line(MARGIN, scale, "length 1");
+    const { value, unit } = this.units.size("x");
+    const next = line(MARGIN, scale, unit ? `${number(value)} ${unit}` : "length 1");
     if (this.distance !== null) {
-      line(next, scale * this.distance, `δ = ${number(this.distance)}`);
+      line(next, scale * this.distance, `δ = ${number(this.distance * value)} ${unit}`.trim());
     }
   }
 }

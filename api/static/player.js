@@ -21,11 +21,13 @@ export class Player extends EventTarget {
    * @param {Frames} frames
    * @param {import("./flow.js").ImposedFlow | null} flow
    * @param {any} scene - Of the run.
+   * @param {import("./units.js").Units} units - Of the scene.
    * @param {AbortSignal} signal - Stops the player when it is aborted.
    */
-  constructor(frames, flow, scene, signal) {
+  constructor(frames, flow, scene, units, signal) {
     super();
     this.frames = frames;
+    this.units = units;
     this.signal = signal;
     this.time = frames.states[0].time;
     const wanted = frames.end / USUAL_SECONDS;
@@ -33,7 +35,7 @@ export class Player extends EventTarget {
 
     const canvas = element("canvas", { role: "img", tabindex: 0 });
     this.canvas = canvas;
-    this.membranes = new MembraneCanvas(canvas, frames, flow, scene);
+    this.membranes = new MembraneCanvas(canvas, frames, flow, scene, units);
     this.button = element("button", { class: "primary play", onclick: () => this.#toggle() });
     this.clock = element("output", { class: "clock" });
     this.scrubber = element("input", {
@@ -128,7 +130,7 @@ export class Player extends EventTarget {
     this.time = Math.min(Math.max(time, this.frames.states[0].time), this.frames.end);
     this.scrubber.value = String(this.time);
     this.scrubber.setAttribute("aria-valuetext", `time ${number(this.time)}`);
-    this.clock.textContent = `t = ${this.time.toFixed(1)}`;
+    this.clock.textContent = `t = ${this.units.both("time", this.time, (time) => time.toFixed(1))}`;
     this.#draw();
     this.dispatchEvent(new Event(TIME_CHANGED));
   }

@@ -109,3 +109,12 @@ export function keepInAddress(name, value) {
 export function goTo(path) {
   window.location.hash = path;
 }
+
+/**
+ * Make a link to a run, named by the beginning of its key as on the command line.
+ *
+ * @param {string} key
+ */
+export function runLink(key) {
+  return element("a", { href: `#/runs/${key}` }, element("code", {}, key.slice(0, 8)));
+}

@@ -85,7 +85,8 @@ export class Schema {
   }
 
   /**
-   * Return a document with null for every number or text that it does not have and may have.
+   * Return a document with null for every number or text that it does not have and may have, also in tables that it
+   * may have, such as the units. The order is that of the model.
    *
    * @param {any} document
    * @param {any} [node]
@@ -97,27 +98,25 @@ export class Schema {
       return items ? document.map((each) => this.completed(each, items)) : document;
     }
     const properties = this.#table(node, document)?.properties;
+    if (document === null && properties && !properties.kind) {
+      return Object.fromEntries(Object.keys(properties).map((name) => [name, null]));
+    }
     if (!properties || typeof document !== "object" || document === null) {
       return document;
     }
-    const missing = Object.keys(properties).filter(
-      (name) => !(name in document) && this.#isOptionalValue(properties[name]),
-    );
-    return {
-      ...Object.fromEntries(
-        Object.entries(document).map(([name, value]) => [
-          name,
-          name in properties ? this.completed(value, properties[name]) : value,
-        ]),
-      ),
-      ...Object.fromEntries(missing.map((name) => [name, null])),
-    };
+    const names = Object.keys(properties).filter((name) => name in document || this.#isOptional(properties[name]));
+    const completed = names.map((name) => [name, this.completed(document[name] ?? null, properties[name])]);
+    return { ...Object.fromEntries(completed), ...rest(document, properties) };
   }
 
-  /** @param {any} node */
-  #isOptionalValue(node) {
+  /**
+   * Whether there may be no such value or table; a table that is one of several kinds has a menu instead.
+   *
+   * @param {any} node
+   */
+  #isOptional(node) {
     const all = this.#alternatives(node);
-    return all.some((each) => each.type === "null") && !all.some((each) => each.properties);
+    return all.some((each) => each.type === "null") && !all.some((each) => each.properties?.kind);
   }
 
   /**
@@ -166,6 +165,16 @@ export class Schema {
   #resolved({ $ref: reference, ...others }) {
     return reference ? { ...this.root.$defs[reference.split("/").pop()], ...others } : others;
   }
+}
+
+/**
+ * What a document has beside some properties.
+ *
+ * @param {any} document
+ * @param {any} properties
+ */
+function rest(document, properties) {
+  return Object.fromEntries(Object.entries(document).filter(([name]) => !(name in properties)));
 }
 
 /**

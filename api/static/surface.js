@@ -5,15 +5,16 @@
  */
 
 import { bracketed, placeOf, sweepsOf, title } from "./diagram.js";
-import { number } from "./format.js";
 import { axis } from "./plot.js";
 import { quantity } from "./symbols.js";
 import { color } from "./theme.js";
+import { inUnits } from "./units.js";
 
 /**
  * @typedef {import("./diagram.js").Boundary} Boundary
  * @typedef {import("./diagram.js").Point} Point
  * @typedef {import("./plot.js").Figure} Figure
+ * @typedef {import("./units.js").Units} Units
  */
 
 // Viridis without its pale end, which would vanish on a light page.
@@ -26,24 +27,31 @@ const LAYOUT = { height: 420, margin: { l: 64, r: 16, t: 12, b: 56 }, hovermode:
  * Draw a curve of the first parameter, with brackets, for each value of the others.
  *
  * @param {Boundary} boundary
+ * @param {Units} units
  * @returns {Figure}
  */
-export function surfaceCurves(boundary) {
+export function surfaceCurves(boundary, units) {
   const { scene, search } = boundary.study;
-  const [first, ...others] = sweepsOf(boundary.study).map(({ parameter }) => quantity(parameter, scene));
+  const [across, ...paths] = sweepsOf(boundary.study).map(({ parameter }) => parameter);
+  const first = quantity(across, scene);
+  const name = (/** @type {Point[]} */ points) =>
+    paths
+      .map((path, index) => `${quantity(path, scene).symbol} = ${units.both(path, placeOf(points[0], boundary)[index + 1])}`)
+      .join(", ");
   const searched = quantity(search.parameter, scene);
   const curves = curvesOf(boundary);
-  return {
+  const figure = {
     data: curves.map((points, index) =>
-      curve(boundary, points, others, colorAt(curves.length > 1 ? index / (curves.length - 1) : 0)),
+      curve(boundary, points, name(points), colorAt(curves.length > 1 ? index / (curves.length - 1) : 0)),
     ),
     layout: {
       ...LAYOUT,
-      xaxis: axis({ title: { text: title(first), standoff: 12 } }),
-      yaxis: axis({ title: { text: `critical ${title(searched)}`, standoff: 12 }, rangemode: "normal" }),
+      xaxis: axis({ title: { text: units.label(title(first), across), standoff: 12 } }),
+      yaxis: axis({ title: { text: units.label(`critical ${title(searched)}`, search.parameter), standoff: 12 }, rangemode: "normal" }),
       legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom", font: { size: 12, color: color("muted") } },
     },
   };
+  return inUnits(figure, { x: units.size(across), y: units.size(search.parameter) });
 }
 
 /**
@@ -64,16 +72,16 @@ function curvesOf(boundary) {
 /**
  * @param {Boundary} boundary
  * @param {Point[]} points - Of the curve.
- * @param {{symbol: string}[]} others - The parameters that do not change along it.
+ * @param {string} name - The parameters that do not change along it.
  * @param {string} stroke
  */
-function curve(boundary, points, others, stroke) {
+function curve(boundary, points, name, stroke) {
   const places = points.map((point) => placeOf(point, boundary));
   const critical = points.map((point) => point.critical_value ?? NaN);
   return {
     type: "scatter",
     mode: "lines+markers",
-    name: others.map(({ symbol }, index) => `${symbol} = ${number(places[0][index + 1])}`).join(", "),
+    name,
     showlegend: true,
     x: places.map(([x]) => x),
     y: critical,
@@ -100,17 +108,20 @@ function colorAt(share) {
  * Draw the critical values over two parameters as a filled map.
  *
  * @param {Boundary} boundary
+ * @param {Units} units
  * @returns {Figure}
  */
-export function surfaceMap(boundary) {
+export function surfaceMap(boundary, units) {
   const { scene, search } = boundary.study;
   const [first, second] = sweepsOf(boundary.study);
   const [x, y] = [first, second].map(({ values }) => [...values].sort((one, other) => one - other));
   const known = new Map(
     boundary.points.map((point) => [placeOf(point, boundary).join(), point.critical_value]),
   );
-  const [across, up] = [first, second].map(({ parameter }) => title(quantity(parameter, scene)));
-  return {
+  const label = (/** @type {string} */ path) => units.label(title(quantity(path, scene)), path);
+  const critical = units.label(`critical ${quantity(search.parameter, scene).symbol}`, search.parameter);
+  const [across, up] = [first, second].map(({ parameter }) => label(parameter));
+  const figure = {
     data: [
       {
         type: "contour",
@@ -118,7 +129,7 @@ export function surfaceMap(boundary) {
         y,
         z: y.map((other) => x.map((at) => known.get([at, other].join()) ?? null)),
         colorscale: COLORSCALE,
-        colorbar: { title: { text: `critical ${quantity(search.parameter, scene).symbol}` }, thickness: 14 },
+        colorbar: { title: { text: critical }, thickness: 14 },
         contours: { coloring: "fill" },
         line: { width: 0 },
         hovertemplate: "%{x}, %{y}: %{z:.4g}<extra></extra>",
@@ -130,4 +141,6 @@ export function surfaceMap(boundary) {
       yaxis: axis({ title: { text: up, standoff: 12 } }),
     },
   };
+  const [x_size, y_size, z] = [first.parameter, second.parameter, search.parameter].map((path) => units.size(path));
+  return inUnits(figure, { x: x_size, y: y_size, z });
 }

@@ -2,6 +2,7 @@
 
 import { getAll } from "./api.js";
 import { number } from "./format.js";
+import { Units } from "./units.js";
 
 /**
  * @typedef {object} Quantity
@@ -63,9 +64,10 @@ export function quantity(path, scene) {
  *
  * @param {any} scene
  * @param {string[]} [without] - Dotted paths to omit, for example those of the axes.
+ * @param {Units} [units] - If they are given, numbers are written with them, too.
  * @returns {string}
  */
-export function describe(scene, without = []) {
+export function describe(scene, without = [], units = new Units()) {
   const of = (/** @type {string} */ field) =>
     [...new Set(scene.vesicles.map((/** @type {any} */ vesicle) => vesicle[field] ?? 1))].sort((a, b) => a - b);
   const contrasts = of("viscosity_contrast");
@@ -86,7 +88,7 @@ export function describe(scene, without = []) {
     .filter(([path, numbers]) => numbers.length > 0 && !without.includes(path))
     .map(
       ([path, numbers]) =>
-        `${quantity(path, scene).symbol} = ${listed(/** @type {number[]} */ (numbers))}`,
+        `${quantity(path, scene).symbol} = ${listed(path, /** @type {number[]} */ (numbers), units)}`,
     );
   const count = scene.vesicles.length;
   const vesicles = count === 1 ? "1 vesicle" : `${count} vesicles`;
@@ -97,12 +99,14 @@ export function describe(scene, without = []) {
 /**
  * List a few numbers; of many, write the range.
  *
+ * @param {string} path
  * @param {number[]} values - Ascending.
+ * @param {Units} units
  */
-function listed(values) {
+function listed(path, values, units) {
   return values.length > MOST_NUMBERS
     ? `${number(values[0], 3)} to ${number(values[values.length - 1], 3)}`
-    : values.map((value) => number(value)).join(" and ");
+    : values.map((value) => units.both(path, value)).join(" and ");
 }
 
 /**

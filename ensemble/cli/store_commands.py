@@ -131,6 +131,10 @@ def show(  # numpydoc ignore=PR01
     as_json: AsJson = False,
 ) -> None:
     """Print a run, a boundary, a map or a branch of steady states, or draw it to a file."""
+    from rich.console import Console
+
+    from ensemble.display.counted_progress import counted_progress
+
     drawing = {"size": size, "dpi": dpi, "svg_text": svg_text or None}
     with refusing():
         options = _figure_options({name: each for name, each in drawing.items() if each is not None}, output)
@@ -141,7 +145,8 @@ def show(  # numpydoc ignore=PR01
         if units is not None:
             answer = answer.in_units(_units_of(units))
         if output is not None:
-            answer.draw(output, options)
+            with counted_progress(Console(stderr=True), "drawing pictures", "pictures drawn") as on_progress:
+                answer.draw(output, options, on_progress)
         elif as_json:
             print_json(answer.json_document())
         else:
@@ -188,12 +193,17 @@ def check(  # numpydoc ignore=PR01
     """
     from rich.console import Console
 
-    from ensemble.display.check_progress import check_lines, check_progress
+    from ensemble.display.counted_progress import VERIFIED, check_lines, counted_progress
     from ensemble.store.unfinished import interrupted_runs
 
     at_once = processes or len(os.sched_getaffinity(0))
-    display = check_lines if progress is ProgressFormat.JSON else check_progress
-    with refusing(), display(Console(stderr=True)) as on_progress:
+    console = Console(stderr=True)
+    display = (
+        check_lines(console)
+        if progress is ProgressFormat.JSON
+        else counted_progress(console, "verifying runs", VERIFIED)
+    )
+    with refusing(), display as on_progress:
         done = _repaired(store, on_progress, at_once) if repair else []
         with _existing(store) as opened:
             problems = opened.check(on_progress, at_once)

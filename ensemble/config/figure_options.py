@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from typing import Annotated
 
 from pydantic import Field
@@ -11,6 +12,9 @@ from solver.scene import Model
 
 _SIZE = re.compile(r"(\d+(?:\.\d*)?)\s*[x×]\s*(\d+(?:\.\d*)?)")
 INCH = 2.54  # centimeters
+
+# Called while a movie is drawn, with the number of pictures that are drawn and of all.
+OnPicture = Callable[[int, int], None]
 
 _Side = Annotated[float, Field(ge=3, le=100)]
 

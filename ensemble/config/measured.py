@@ -93,12 +93,24 @@ def dimension_at(node: Any, path: str) -> Dimension | None:
     if rest and not isinstance(getattr(node, name, None), int | float | str | None):
         inner = getattr(node, name)
         elements_are_numbers = is_array(inner) and inner and isinstance(inner[0], int | float)
-        return _stated(type(node), name) if elements_are_numbers else dimension_at(inner, rest)
-    return None if rest else _stated(type(node), name)
+        return stated_dimension(type(node), name) if elements_are_numbers else dimension_at(inner, rest)
+    return None if rest else stated_dimension(type(node), name)
 
 
-def _stated(cls: type, name: str) -> Dimension | None:
-    """Return the dimension that a field of a class states."""
+def stated_dimension(cls: type, name: str) -> Dimension | None:
+    """Return the dimension that a field of a class states.
+
+    Parameters
+    ----------
+    cls : type
+        A model or a dataclass.
+    name : str
+
+    Returns
+    -------
+    Dimension or None
+        None if there is no such field, or it has none.
+    """
     if issubclass(cls, BaseModel):
         field = cls.model_fields.get(name)
         if field is None:
@@ -132,6 +144,26 @@ def measured_fields(node: Any, document: Mapping[str, Any], units: Units | None)
     return measured_values(
         {path: (each, dimension_at(node, path)) for path, each in _numbers(document)}, units
     )
+
+
+def unit_sizes(node: Any, document: Mapping[str, Any], units: Units | None) -> dict[str, Measured]:
+    """Return how much one is of each number of a document that has a dimension.
+
+    Parameters
+    ----------
+    node : model or dataclass
+        Whose fields the document holds.
+    document : mapping
+        Nested tables.
+    units : Units or None
+        None if the scene has none.
+
+    Returns
+    -------
+    dict
+        By dotted path; empty without units.
+    """
+    return measured_values({path: (1.0, dimension_at(node, path)) for path, _ in _numbers(document)}, units)
 
 
 def measured_values(

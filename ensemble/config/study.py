@@ -161,13 +161,13 @@ class Study(Model):
     Attributes
     ----------
     name : str
-        What the study and its boundary are called; at most 100 characters.
+        Name of the study and of its boundary; at most 100 characters.
     scene : Scene
         The scene in which the parameters are varied.
     sweep : tuple of Sweep
         A critical value is searched for at every combination of their values; a table if there is one.
     search : Search
-        That critical value.
+        Which critical value is searched for, and how.
     """
 
     # Without control characters: it is shown on terminals and in pages.

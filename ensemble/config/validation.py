@@ -12,7 +12,7 @@ from pydantic_core import ErrorDetails
 
 from ensemble.config.dotted_paths import Location, dotted, value_at
 from ensemble.config.parameter_values import ONE, SEVERAL
-from solver.dimensions import UNITS
+from solver.dimensions import UNITS, decimal_point_wanted
 from solver.scene import Units
 
 Validated = TypeVar("Validated")
@@ -135,10 +135,16 @@ def describe(problems: Sequence[ErrorDetails], document: Mapping[str, Any]) -> s
     messages: dict[str, list[str]] = {}
     for problem in problems:
         if problem["loc"] not in enclosing:
-            message = _WORDS.get(problem["type"], problem["msg"]).removeprefix("Value error, ")
+            message = _reason(problem)
             about_subject = messages.setdefault(_subject(problem, document), [])
             about_subject.append(message[:1].lower() + message[1:])
     return "; ".join(subject + ", or ".join(texts) for subject, texts in messages.items())
+
+
+def _reason(problem: ErrorDetails) -> str:
+    given = problem["input"]
+    point = decimal_point_wanted(given) if isinstance(given, str) else None
+    return point or _WORDS.get(problem["type"], problem["msg"]).removeprefix("Value error, ")
 
 
 def _subject(problem: ErrorDetails, document: Mapping[str, Any]) -> str:

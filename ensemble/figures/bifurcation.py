@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ensemble.figures.style import BLACK, MARKS, STYLE, VERMILLION, WIDTH
-from ensemble.figures.symbols import axis_label, describe, number_text, with_unit
+from ensemble.figures.symbols import AxisUnit, describe, quantity
 from ensemble.search.branch_summary import BranchPointRecord, BranchSummary
 from solver.analysis.run import Outcome
 from solver.dimensions import ENERGY_PER_DEPTH, LENGTH, RATE, Dimension
@@ -44,17 +44,23 @@ def bifurcation_diagram(branches: Sequence[BranchSummary]) -> Figure:
     """
     first = branches[0]
     label, dimension, response = _response(branches)
+    scene = first.scene
+    along, up, rate = (
+        AxisUnit.at(first.parameter, scene),
+        AxisUnit.of(dimension, scene),
+        AxisUnit.of(RATE, scene),
+    )
     figure = Figure(figsize=(WIDTH, 5.2), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
     upper.set_title(describe(first.scene, without=(first.parameter,)), pad=10)
-    upper.set_ylabel(with_unit(label, dimension, first.scene))
-    lower.set_xlabel(axis_label(first.parameter, first.scene))
-    lower.set_ylabel(with_unit("fastest growth rate", RATE, first.scene))
+    upper.set_ylabel(up.label(label))
+    lower.set_xlabel(along.label(quantity(first.parameter, scene.flow).label))
+    lower.set_ylabel(rate.label("fastest growth rate"))
     lower.axhline(0, color=BLACK, linewidth=0.6)
     for branch in branches:
-        for axes, measured in ((upper, response), (lower, _fastest_growth)):
-            _draw_branch(axes, branch, measured)
-            _draw_special(axes, branch, measured)
+        for axes, measured, unit in ((upper, response, up), (lower, _fastest_growth, rate)):
+            _draw_branch(_Plane(axes, measured, along, unit), branch)
+            _draw_special(_Plane(axes, measured, along, unit), branch)
     handles, labels = upper.get_legend_handles_labels()
     unique = dict(zip(labels, handles, strict=True))
     figure.legend(unique.values(), unique.keys(), loc="outside right upper")
@@ -79,15 +85,26 @@ def _fastest_growth(point: BranchPointRecord) -> float:
     return point.state.eigenvalues[0][0]
 
 
-def _draw_branch(axes: Axes, branch: BranchSummary, measured: Measured) -> None:
+class _Plane(NamedTuple):
+    """Axes, what is drawn in them against the parameter, and the units of both."""
+
+    axes: Axes
+    measured: Measured
+    along: AxisUnit
+    up: AxisUnit
+
+    def place(self, point: BranchPointRecord) -> tuple[float, float]:
+        return self.along.size * point.value, self.up.size * self.measured(point)
+
+
+def _draw_branch(plane: _Plane, branch: BranchSummary) -> None:
     """Draw each part between changes of stability or of outcome as one line."""
     parts = groupby(_pieces(branch), key=lambda piece: (piece.stable, piece.outcome))
     for (stable, outcome), pieces in parts:
         listed = list(pieces)
         points = [listed[0].start, *(piece.end for piece in listed)]
-        axes.plot(
-            [point.value for point in points],
-            [measured(point) for point in points],
+        plane.axes.plot(
+            *zip(*map(plane.place, points), strict=True),
             color=MARKS[outcome].color,
             linestyle="-" if stable else (0, (3, 2)),
             linewidth=1.8 if stable else 1.2,
@@ -123,12 +140,11 @@ def _detour(start: BranchPointRecord, middle: BranchPointRecord, end: BranchPoin
     return float(sum(np.linalg.norm(b - a) for a, b in pairwise(places)))
 
 
-def _draw_special(axes: Axes, branch: BranchSummary, measured: Measured) -> None:
+def _draw_special(plane: _Plane, branch: BranchSummary) -> None:
     for name, points, shape in (("fold", branch.folds, "D"), ("crossing", branch.crossings, "o")):
         for point in points:
-            axes.plot(
-                point.value,
-                measured(point),
+            plane.axes.plot(
+                *plane.place(point),
                 linestyle="none",
                 marker=shape,
                 markersize=6,
@@ -136,6 +152,6 @@ def _draw_special(axes: Axes, branch: BranchSummary, measured: Measured) -> None
                 markerfacecolor="white",
                 markeredgewidth=1.3,
                 zorder=4,
-                label=f"{name}, {number_text(point.value, 8)}",
+                label=f"{name}, {plane.along.text(point.value, 8)}",
                 gid=name,
             )

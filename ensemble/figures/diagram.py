@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import matplotlib
 import numpy as np
@@ -11,7 +12,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from ensemble.figures.style import ALL_MARKS, BLACK, GRAY, STYLE, VERMILLION, WIDTH
-from ensemble.figures.symbols import Quantity, axis_label, describe, number_text, quantity
+from ensemble.figures.symbols import AxisUnit, Quantity, axis_label, describe, number_text, quantity
 from ensemble.search.boundary import Boundary, BoundaryPoint
 from ensemble.search.critical_value import SearchStatus
 from ensemble.search.line import Line, line_through
@@ -44,21 +45,27 @@ def phase_diagram(
     (swept,) = boundary.swept
     searched = boundary.searched
     scene = boundary.scene
-    x, y = quantity(swept, scene.flow), quantity(searched, scene.flow)
+    plane = _Plane(
+        x=quantity(swept, scene.flow),
+        y=quantity(searched, scene.flow),
+        across=AxisUnit.at(swept, scene).size,
+        up=AxisUnit.at(searched, scene).size,
+        swept=swept,
+    )
 
     figure = Figure(figsize=(width, 4.0), layout="constrained")
     axes = figure.add_subplot(xlabel=axis_label(swept, scene), ylabel=axis_label(searched, scene))
     axes.set_title(describe(scene, without=(swept, searched)), pad=10, wrap=True)
-    _draw_runs(axes, runs)
+    _draw_runs(axes, runs, plane)
     points = sorted(boundary.points, key=lambda point: point.parameters[swept])
     bracketed = [point for point in points if point.critical_value is not None]
     if bracketed:
-        _draw_brackets(axes, bracketed, swept)
-        _draw_boundary(axes, bracketed, swept, y)
-    _draw_other_changes(axes, points, swept)
+        _draw_brackets(axes, bracketed, plane)
+        _draw_boundary(axes, bracketed, plane)
+    _draw_other_changes(axes, points, plane)
     converged = [point for point in bracketed if point.status == SearchStatus.CONVERGED]
     if (line := line_through(boundary)) is not None:
-        _draw_fit(axes, line, [point.parameters[swept] for point in converged], x, y)
+        _draw_fit(axes, line, [point.parameters[swept] for point in converged], plane)
     axes.margins(0.06)
     if axes.get_legend_handles_labels()[0]:
         if width < _NARROW:
@@ -68,9 +75,23 @@ def phase_diagram(
     return figure
 
 
-def _draw_runs(axes: Axes, runs: Sequence[tuple[float, float, str]]) -> None:
+class _Plane(NamedTuple):
+    """The two parameters of a diagram, the sizes of their units, and the path of the swept one."""
+
+    x: Quantity
+    y: Quantity
+    across: float
+    up: float
+    swept: str
+
+    def places(self, points: Sequence[BoundaryPoint]) -> Array:
+        return self.across * np.array([point.parameters[self.swept] for point in points])
+
+
+def _draw_runs(axes: Axes, runs: Sequence[tuple[float, float, str]], plane: _Plane) -> None:
     for outcome, mark in ALL_MARKS.items():
-        places = np.array([(sweep, value) for sweep, value, result in runs if result == outcome])
+        found = [(sweep, value) for sweep, value, result in runs if result == outcome]
+        places = np.array(found) * (plane.across, plane.up) if found else np.array([])
         if places.size:
             axes.plot(
                 *places.T,
@@ -86,13 +107,13 @@ def _draw_runs(axes: Axes, runs: Sequence[tuple[float, float, str]]) -> None:
             )
 
 
-def _draw_other_changes(axes: Axes, points: Sequence[BoundaryPoint], swept: str) -> None:
+def _draw_other_changes(axes: Axes, points: Sequence[BoundaryPoint], plane: _Plane) -> None:
     """Draw the brackets of changes that are not the answer, where a point has several."""
     places = [
-        (point.parameters[swept], *change.bracket) for point in points for change in point.other_changes
+        (point.parameters[plane.swept], *change.bracket) for point in points for change in point.other_changes
     ]
     if places:
-        sweep, low, high = np.array(places).T
+        sweep, low, high = (np.array(places) * (plane.across, plane.up, plane.up)).T
         _bars(axes, sweep, low, high, VERMILLION, "another change of the outcome").set_gid("other change")
 
 
@@ -114,40 +135,37 @@ def _bars(
     return bars
 
 
-def _draw_brackets(axes: Axes, bracketed: Sequence[BoundaryPoint], swept: str) -> None:
+def _draw_brackets(axes: Axes, bracketed: Sequence[BoundaryPoint], plane: _Plane) -> None:
     for label, is_certified in (("bracket", False), ("certified bracket", True)):
         points = [point for point in bracketed if point.certified == is_certified]
         if points:
-            low, high = np.array([point.bracket for point in points], dtype=float).T
-            sweep = np.array([point.parameters[swept] for point in points])
-            _bars(axes, sweep, low, high, BLACK, label, is_certified).set_gid(label)
+            low, high = plane.up * np.array([point.bracket for point in points], dtype=float).T
+            _bars(axes, plane.places(points), low, high, BLACK, label, is_certified).set_gid(label)
 
 
-def _draw_boundary(axes: Axes, bracketed: Sequence[BoundaryPoint], swept: str, y: Quantity) -> None:
+def _draw_boundary(axes: Axes, bracketed: Sequence[BoundaryPoint], plane: _Plane) -> None:
+    critical = plane.up * np.array([point.critical_value for point in bracketed], dtype=float)
     axes.plot(
-        *_critical_values(bracketed, swept),
+        plane.places(bracketed),
+        critical,
         color=GRAY,
         zorder=1.5,
-        label=f"critical value ${y.critical}$",
+        label=f"critical value ${plane.y.critical}$",
         gid="boundary",
     )
 
 
-def _draw_fit(axes: Axes, line: Line, sweep: Sequence[float], x: Quantity, y: Quantity) -> None:
+def _draw_fit(axes: Axes, line: Line, sweep: Sequence[float], plane: _Plane) -> None:
     sign = "−" if line.intercept < 0 else "+"
-    slope, intercept = number_text(line.slope, 3), number_text(abs(line.intercept), 2)
+    slope = number_text(line.slope * plane.up / plane.across, 3)
+    intercept = number_text(abs(line.intercept) * plane.up, 2)
     ends = np.array([min(sweep), max(sweep)])
     axes.plot(
-        ends,
-        line.intercept + line.slope * ends,
+        plane.across * ends,
+        plane.up * (line.intercept + line.slope * ends),
         color=BLACK,
         linestyle=(0, (4, 3)),
         zorder=1.6,
-        label=f"fit, ${y.critical}$ = {slope} ${x.symbol}$ {sign} {intercept}",
+        label=f"fit, ${plane.y.critical}$ = {slope} ${plane.x.symbol}$ {sign} {intercept}",
         gid="fit",
     )
-
-
-def _critical_values(bracketed: Sequence[BoundaryPoint], swept: str) -> tuple[Array, Array]:
-    sweep = np.array([point.parameters[swept] for point in bracketed])
-    return sweep, np.array([point.critical_value for point in bracketed], dtype=float)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 import textwrap
 
 import matplotlib
@@ -14,7 +13,7 @@ from ensemble.figures.membranes import add_tension_bar, extended_ends
 from ensemble.figures.panels import PANELS
 from ensemble.figures.snapshots import choose_snapshots, draw_snapshots
 from ensemble.figures.style import GRAY, STYLE, WIDTH
-from ensemble.figures.symbols import describe, with_unit
+from ensemble.figures.symbols import AxisUnit, broken, describe
 from solver.analysis.contacts import CONTACT
 from solver.analysis.run import Array, Run
 from solver.dimensions import TENSION, TIME
@@ -29,7 +28,6 @@ _CLUSTERS = (
     f"filled: vesicles nearer than {CONTACT:g} adhesion distances to each other, a color for each cluster"
 )
 _CHARACTERS = 105  # in a line of the heading of the usual width
-_UNSEEN = re.compile(r"(?<=\\.)[A-Za-z]+|[${}\\]")  # a command of TeX counts as one character
 
 
 @matplotlib.rc_context(STYLE)
@@ -71,17 +69,18 @@ def run_figure(run: Run, width: float = WIDTH, in_one_column: bool = False) -> F
             explained, (0, 0), (0, -2), "axes fraction", "offset points", va="top", fontsize="small"
         )
     bar = add_tension_bar(figure, membranes, snapshots, extended_ends(membranes))
-    bar.set_label(with_unit(r"tension $\sigma$", TENSION, run.scene))
+    bar.set_label(AxisUnit.of(TENSION, run.scene).label(r"tension $\sigma$"))
 
+    unit = AxisUnit.of(TIME, run.scene)
     cells = grid[1].subgridspec(rows, columns)
     for position, (name, draw) in enumerate(panels.items()):
         row, column = divmod(position, columns)
         axes = figure.add_subplot(cells[row, column], label=name)
         draw(axes, run)
         if row == rows - 1:
-            axes.set_xlabel(with_unit("time $t$", TIME, run.scene))
+            axes.set_xlabel(unit.label("time $t$"))
         for time in run.frames.time[chosen]:
-            axes.axvline(time, color=GRAY, alpha=0.3, linewidth=0.7, zorder=0.5)
+            axes.axvline(unit.size * time, color=GRAY, alpha=0.3, linewidth=0.7, zorder=0.5)
 
     height = np.clip(width * np.ptp(snapshots.get_ylim()) / np.ptp(snapshots.get_xlim()), *_SNAPSHOTS)
     grid.set_height_ratios([height, rows * _PANEL])
@@ -100,22 +99,10 @@ def _clusters(run: Run) -> Array | None:
 
 def _heading(run: Run, characters: int) -> list[str]:
     """Return the scene, and the outcome with the reason of a failure, in lines that fit."""
-    outcome = f"{run.outcome} at $t$ = {run.time:.4g}"
+    unit = AxisUnit.of(TIME, run.scene)
+    outcome = f"{run.outcome} at $t$ = {unit.both(run.time, 4)}"
     if run.period is not None:
-        outcome += f", period {run.period:.4g}" + (" (not settled)" if run.settled is False else "")
+        outcome += f", period {unit.both(run.period, 4)}" + (" (not settled)" if run.settled is False else "")
     if reason := run.failure or run.undecided:
         outcome += ": " + reason.replace("$", r"\$")
-    return [*_lines(describe(run.scene), characters), *textwrap.wrap(outcome, characters)]
-
-
-def _lines(description: str, characters: int) -> list[str]:
-    """Break a description of a scene at its commas; what TeX does not show takes no room."""
-    lines = [""]
-    for part in description.split(", "):
-        longer = f"{lines[-1]}, {part}" if lines[-1] else part
-        if lines[-1] and len(_UNSEEN.sub("", longer)) > characters:
-            lines[-1] += ","
-            lines.append(part)
-        else:
-            lines[-1] = longer
-    return lines
+    return [*broken(describe(run.scene), characters), *textwrap.wrap(outcome, characters)]

@@ -12,10 +12,10 @@ from matplotlib.colors import ListedColormap, to_hex, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from ensemble.config.outcome_map import Axis
 from ensemble.figures.style import BLACK, CLUSTER_COLORS, MARKS, STYLE, WIDTH
-from ensemble.figures.symbols import axis_label, describe
+from ensemble.figures.symbols import AxisUnit, axis_label, describe
 from ensemble.search.map_record import MapRecord
+from solver.analysis.run import Array
 
 _NARROW = 5.0  # inches
 _TINT = 0.62  # of white in the color of a region, on which the cells that were run are darker
@@ -43,11 +43,12 @@ def map_diagram(record: MapRecord, width: float = WIDTH) -> Figure:
     axes.set_title(describe(scene, without=(x.parameter, y.parameter)), pad=10, wrap=True)
     for axis, scale in ((x, axes.set_xscale), (y, axes.set_yscale)):
         scale("linear" if axis.spacing == "linear" else "log")
+    across, up = (AxisUnit.at(axis.parameter, scene).size for axis in (x, y))
+    edges = across * np.array(x.edges), up * np.array(y.edges)
     colors = _colors(record.labels)
     tints = [_tint(color) for color in colors]
     axes.pcolormesh(
-        x.edges,
-        y.edges,
+        *edges,
         record.numbers.T,
         cmap=ListedColormap(tints),
         vmin=-0.5,
@@ -59,9 +60,9 @@ def map_diagram(record: MapRecord, width: float = WIDTH) -> Figure:
         made = [each.cell for each in record.runs if record.cells[each.cell[0]][each.cell[1]] == number]
         if made:
             columns, rows = np.array(made).T
-            places = np.array(x.values)[columns], np.array(y.values)[rows]
+            places = across * np.array(x.values)[columns], up * np.array(y.values)[rows]
             axes.plot(*places, ".", color=color, markersize=2.6, gid="run")
-    _draw_boundary(axes, record, x, y)
+    _draw_boundary(axes, record, *edges)
     patches = [Patch(color=tint, label=word) for tint, word in zip(tints, record.labels, strict=True)]
     dots = axes.plot([], [], ".", color=BLACK, markersize=2.6, label="run")
     if width < _NARROW:
@@ -84,15 +85,11 @@ def _tint(color: str) -> str:
     return to_hex((red, green, blue))
 
 
-def _draw_boundary(axes: Axes, record: MapRecord, x: Axis, y: Axis) -> None:
+def _draw_boundary(axes: Axes, record: MapRecord, x: Array, y: Array) -> None:
     """Draw the edges between cells with different labels."""
     numbers = record.numbers
-    upright = [
-        [(x.edges[i + 1], y.edges[j]), (x.edges[i + 1], y.edges[j + 1])]
-        for i, j in np.argwhere(numbers[1:] != numbers[:-1])
-    ]
+    upright = [[(x[i + 1], y[j]), (x[i + 1], y[j + 1])] for i, j in np.argwhere(numbers[1:] != numbers[:-1])]
     level = [
-        [(x.edges[i], y.edges[j + 1]), (x.edges[i + 1], y.edges[j + 1])]
-        for i, j in np.argwhere(numbers[:, 1:] != numbers[:, :-1])
+        [(x[i], y[j + 1]), (x[i + 1], y[j + 1])] for i, j in np.argwhere(numbers[:, 1:] != numbers[:, :-1])
     ]
     axes.add_collection(LineCollection([*upright, *level], colors=BLACK, linewidths=0.9, gid="boundary"))

@@ -13,7 +13,9 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from ensemble.figures.style import TENSION_COLORS
+from ensemble.figures.symbols import AxisUnit
 from solver.analysis.run import Array, Run
+from solver.dimensions import TENSION
 from solver.membrane.curve import positions
 from solver.membrane.spectral import interpolation
 from solver.scene import Scene
@@ -42,7 +44,7 @@ def membrane_segments(
     ends : (..., vesicles, segments, 2, 2)
         Start and end (x, y) of each segment, relative to the mean of the centers of all vesicles.
     tension : (..., vesicles, segments)
-        Mean of the tensions at both ends.
+        Mean of the tensions at both ends, in the unit in which figures show it.
     """
     vesicles, points = tangent_angle.shape[-2:]
     wanted = _SEGMENTS if vesicles <= FEW else _SEGMENTS_OF_MANY
@@ -51,7 +53,7 @@ def membrane_segments(
     about_mean = center - center.mean(axis=-2, keepdims=True)
     start = np.swapaxes(positions(tangent_angle, about_mean, length) @ refine.T, -1, -2)
     ends = np.stack([start, np.roll(start, -1, axis=-2)], axis=-2)
-    at_start = tension @ refine.T
+    at_start = AxisUnit.of(TENSION, scene).size * tension @ refine.T
     return ends, (at_start + np.roll(at_start, -1, axis=-1)) / 2
 
 

@@ -20,6 +20,7 @@ from matplotlib.gridspec import SubplotSpec
 from matplotlib.quiver import Quiver
 from scipy.interpolate import Akima1DInterpolator
 
+from ensemble.config.figure_options import OnPicture
 from ensemble.disk import replacing
 from ensemble.errors import EnsembleError
 from ensemble.figures.membranes import (
@@ -33,7 +34,7 @@ from ensemble.figures.membranes import (
 from ensemble.figures.panels import PANELS
 from ensemble.figures.snapshots import finite_frames
 from ensemble.figures.style import GRAY, INSIDE, STYLE, VERMILLION
-from ensemble.figures.symbols import describe, with_unit
+from ensemble.figures.symbols import AxisUnit, broken, describe
 from solver.analysis.run import Array, Frames, Run
 from solver.dimensions import TENSION, TIME
 from solver.flows import ImposedFlow
@@ -42,7 +43,8 @@ _PACE = 8.0  # units of time a second: a doublet at shear rate 0.5 takes about f
 _DURATION = (5.0, 20.0)  # seconds, at least and at most
 _HOLD = 1.0  # seconds for which the last state is shown before a player starts again
 
-_SIZE = (8.0, 4.5)  # inches
+_SIZE = (16 / 3, 3.0)  # inches: letters of ten points can be read where the picture is small
+_CHARACTERS = 85  # in a line of the title
 _TRACES = 2  # diagnostics beside the membranes, at most
 _MARGIN = 0.5  # around the membranes, in the unit of length
 _ARROWS = 12  # of the flow, along the longer side of the view
@@ -59,13 +61,13 @@ class _Format(NamedTuple):
 
 
 _FORMATS: Final = {
-    ".mp4": _Format(FFMpegWriter, {"codec": "h264", "extra_args": ["-crf", "18"]}, 30, 160, True),
-    ".gif": _Format(PillowWriter, {}, 20, 80, False),
+    ".mp4": _Format(FFMpegWriter, {"codec": "h264", "extra_args": ["-crf", "18"]}, 30, 240, True),
+    ".gif": _Format(PillowWriter, {}, 20, 120, False),
 }
 MOVIE_SUFFIXES: Final = tuple(_FORMATS)
 
 
-def save_movie(run: Run, path: Path) -> None:
+def save_movie(run: Run, path: Path, on_progress: OnPicture | None = None) -> None:
     """Write a movie of a run, in the format that the suffix of the file names.
 
     It lasts from 5 to 20 seconds.  States between two frames are interpolated, so this does not depend on how
@@ -76,6 +78,8 @@ def save_movie(run: Run, path: Path) -> None:
     run : Run
     path : Path
         Its suffix is ``.mp4`` (1280 × 720, 30 pictures per second) or ``.gif`` (640 × 360, 20 per second).
+    on_progress : callable, optional
+        Takes the number of pictures that are drawn, and of all.
 
     Raises
     ------
@@ -92,9 +96,12 @@ def save_movie(run: Run, path: Path) -> None:
         writer = form.writer(fps=form.rate, **form.options)
         try:
             with writer.saving(picture.figure, str(unfinished), dpi=form.resolution):
-                for time in picture_times(picture.frames, form.rate):
+                times = picture_times(picture.frames, form.rate)
+                for drawn, time in enumerate(times, start=1):
                     picture.show(time)
                     writer.grab_frame()
+                    if on_progress is not None:
+                        on_progress(drawn, len(times))
         except CalledProcessError as error:
             words = (error.stderr or b"").decode(errors="replace").strip().splitlines()
             raise EnsembleError(
@@ -172,7 +179,7 @@ class Picture:
         traced = [name for name in PANELS if name in run.series][:_TRACES]
 
         self.figure = Figure(figsize=_SIZE, dpi=resolution, layout="constrained")
-        self.figure.suptitle(describe(run.scene), fontsize="medium")
+        self.figure.suptitle("\n".join(broken(describe(run.scene), _CHARACTERS)), fontsize="medium")
         columns = self.figure.add_gridspec(1, 2, width_ratios=(1.7, 1))
         axes = self._add_view(columns[0], tension)
         self._cursors = []
@@ -181,7 +188,8 @@ class Picture:
             panel = self.figure.add_subplot(cells[row], label=name)
             PANELS[name](panel, run)
             self._cursors.append(panel.axvline(0.0, color=VERMILLION, linewidth=1.0))
-        panel.set_xlabel(with_unit("time $t$", TIME, run.scene))
+        self._unit = AxisUnit.of(TIME, run.scene)
+        panel.set_xlabel(self._unit.label("time $t$"))
 
         self.figure.draw_without_rendering()
         self.figure.set_layout_engine("none")  # or labels would shift from picture to picture
@@ -205,12 +213,14 @@ class Picture:
         self.membranes.set_segments(list(ends.reshape(-1, 2, 2)))
         self.membranes.set_array(tension.ravel())
         self._inside.set_verts(list(ends[:, :, 0]))
-        self._time.set_text(f"$t$ = {time:.1f}")
+        shown = self._unit.size * time
+        decimals = max(1 - math.floor(math.log10(self._unit.size)), 0)
+        self._time.set_text(f"$t$ = {shown:.{decimals}f} {self._unit.name}".rstrip())
         if self._flow:
             protocol = self._scene.protocol
             self._flow.show(centers.T, math.copysign(1.0, protocol.factor(time)) if protocol else 1.0)
         for cursor in self._cursors:
-            cursor.set_xdata([time, time])
+            cursor.set_xdata([shown, shown])
 
     def _add_view(self, cell: SubplotSpec, tension: Array) -> Axes:
         """Add the axes that the membranes will move in, and a color bar for tensions (frames, ...)."""
@@ -224,7 +234,7 @@ class Picture:
         axes.add_collection(self._inside, autolim=False)
         axes.add_collection(self.membranes, autolim=False)
         bar = add_tension_bar(self.figure, self.membranes, axes, extended_ends(self.membranes), shrink=0.6)
-        bar.set_label(with_unit(r"tension $\sigma$", TENSION, self._scene))
+        bar.set_label(AxisUnit.of(TENSION, self._scene).label(r"tension $\sigma$"))
         return axes
 
     def _freeze(self, moving: Collection[Artist]) -> None:

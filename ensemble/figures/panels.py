@@ -10,19 +10,24 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MultipleLocator
 
 from ensemble.figures.style import BLACK, BLUE, GRAY, GREEN, VERMILLION
-from ensemble.figures.symbols import DISTANCE, axis_label, with_unit
-from solver.analysis.run import Run
-from solver.dimensions import ENERGY_PER_DEPTH, LENGTH
+from ensemble.figures.symbols import DISTANCE, NO_UNIT, AxisUnit, axis_label
+from solver.analysis.run import Array, Run
+from solver.dimensions import ENERGY_PER_DEPTH, LENGTH, TIME
 
 _ANGLE_STEPS = (1, 2, 5, 10, 15, 30, 45, 90, 180, 360, 720)  # degrees between ticks
 _MOST_TICKS = 5
 
 
+def _times(run: Run) -> Array:
+    return AxisUnit.of(TIME, run.scene).size * run.series["time"]
+
+
 def _draw_gap(axes: Axes, run: Run) -> None:
-    axes.plot(run.series["time"], run.series["gap"], color=BLACK)
-    axes.set(ylabel=with_unit("gap", LENGTH, run.scene), ylim=(0, None))
+    unit = AxisUnit.of(LENGTH, run.scene)
+    axes.plot(_times(run), unit.size * run.series["gap"], color=BLACK)
+    axes.set(ylabel=unit.label("gap"), ylim=(0, None))
     if run.scene.adhesion is not None:
-        distance = run.scene.adhesion.distance
+        distance = unit.size * run.scene.adhesion.distance
         axes.set_ylim(top=max(axes.get_ylim()[1], 1.05 * distance))
         axes.axhline(distance, color=GRAY, linewidth=0.9, linestyle="--")
         beside = axes.get_yaxis_transform()
@@ -31,7 +36,7 @@ def _draw_gap(axes: Axes, run: Run) -> None:
 
 def _draw_angle(axes: Axes, run: Run, name: str) -> None:
     angle = np.degrees(run.series[name])
-    axes.plot(run.series["time"], angle, color=BLACK)
+    axes.plot(_times(run), angle, color=BLACK)
     step = next((step for step in _ANGLE_STEPS if np.ptp(angle) <= _MOST_TICKS * step), _ANGLE_STEPS[-1])
     axes.yaxis.set_major_locator(MultipleLocator(step))
 
@@ -46,13 +51,15 @@ def _draw_inclination(axes: Axes, run: Run) -> None:
     axes.set_ylabel("inclination (deg)")
 
 
-def _draw_parts(axes: Axes, run: Run, membrane: str, label: str, adhesion: str) -> None:
+def _draw_parts(
+    axes: Axes, run: Run, membrane: str, label: str, adhesion: str, unit: AxisUnit = NO_UNIT
+) -> None:
     """Draw the contribution of the membranes and, if there is adhesion, that of adhesion."""
-    axes.plot(run.series["time"], run.series[membrane], color=BLUE, label=label)
+    time = _times(run)
+    axes.plot(time, unit.size * run.series[membrane], color=BLUE, label=label)
     if adhesion in run.series:
-        axes.plot(
-            run.series["time"], run.series[adhesion], color=VERMILLION, linestyle="-.", label="adhesion"
-        )
+        values = unit.size * run.series[adhesion]
+        axes.plot(time, values, color=VERMILLION, linestyle="-.", label="adhesion")
     _label_parts(axes)
 
 
@@ -61,26 +68,28 @@ def _label_parts(axes: Axes) -> None:
 
 
 def _draw_rate(axes: Axes, run: Run) -> None:
-    axes.plot(run.series["time"], run.series["flow_rate"], color=BLACK)
+    unit = AxisUnit.at("flow.rate", run.scene)
+    axes.plot(_times(run), unit.size * run.series["flow_rate"], color=BLACK)
     axes.set_ylabel(axis_label("flow.rate", run.scene))
 
 
 def _draw_energy(axes: Axes, run: Run) -> None:
-    _draw_parts(axes, run, "bending_energy", "bending", "adhesion_energy")
-    axes.set_ylabel(with_unit("energy", ENERGY_PER_DEPTH, run.scene))
+    unit = AxisUnit.of(ENERGY_PER_DEPTH, run.scene)
+    _draw_parts(axes, run, "bending_energy", "bending", "adhesion_energy", unit)
+    axes.set_ylabel(unit.label("energy"))
 
 
 def _draw_viscosity(axes: Axes, run: Run) -> None:
     _draw_parts(axes, run, "viscosity_bending_tension", "bending + tension", "viscosity_adhesion")
     if "viscosity_contrast" in run.series:
         contrast = run.series["viscosity_contrast"]
-        axes.plot(run.series["time"], contrast, color=GREEN, linestyle=":", label="contrast")
+        axes.plot(_times(run), contrast, color=GREEN, linestyle=":", label="contrast")
         _label_parts(axes)
     axes.set_ylabel(r"intrinsic viscosity $[\mu]$")
 
 
 def _draw_clusters(axes: Axes, run: Run) -> None:
-    time = run.series["time"]
+    time = _times(run)
     axes.step(time, run.series["clusters"], where="mid", color=BLUE, label="clusters")
     axes.step(
         time,

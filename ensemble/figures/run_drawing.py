@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ensemble.config.figure_options import USUAL, FigureOptions
+from ensemble.config.figure_options import USUAL, FigureOptions, OnPicture
 from ensemble.figures.figure_files import FIGURE_SUFFIXES, save, suffix_among
 from ensemble.figures.fitted import fitted_run_figure
 from ensemble.figures.history import run_figure
 from solver.analysis.run import Run
 
 
-def draw_run(run: Run, output: Path, options: FigureOptions) -> None:
+def draw_run(run: Run, output: Path, options: FigureOptions, on_progress: OnPicture | None = None) -> None:
     """Draw what happened in a run, or its movie.
 
     Parameters
@@ -21,6 +21,8 @@ def draw_run(run: Run, output: Path, options: FigureOptions) -> None:
         Its suffix names the format.
     options : FigureOptions
         Of a figure.
+    on_progress : callable, optional
+        Takes the number of pictures of a movie that are drawn, and of all.
 
     Raises
     ------
@@ -32,7 +34,7 @@ def draw_run(run: Run, output: Path, options: FigureOptions) -> None:
     if suffix_among(output, (*FIGURE_SUFFIXES, *MOVIE_SUFFIXES)) in MOVIE_SUFFIXES:
         if options != USUAL:
             raise ValueError(f"output: a movie has no size, dpi or svg-text, got {output.name!r}")
-        save_movie(run, output)
+        save_movie(run, output, on_progress)
     else:
         figure = run_figure(run) if options.size is None else fitted_run_figure(run, options.size)
         save(figure, output, options)

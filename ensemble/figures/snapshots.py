@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 from ensemble.figures.membranes import FEW, membrane_lines, membrane_segments, tension_scale
 from ensemble.figures.style import CLUSTER_COLORS, PALE, WIDTH
+from ensemble.figures.symbols import AxisUnit
 from solver.analysis.run import Array, Frames
+from solver.dimensions import TIME
 from solver.scene import Scene
 
 _SPACE = 0.5  # between neighboring snapshots, in the unit of length
@@ -85,7 +87,9 @@ def draw_snapshots(
     reach = np.abs(ends).max(axis=(1, 2, 3))  # (snapshots, 2)
     stacked = len(chosen) > 1 and reach[:, 0].max() > 2 * reach[:, 1].max()
     arrange = _below_each_other if stacked else _beside_each_other
-    ends += arrange(axes, reach, frames.time[chosen])[:, None, None, None, :]
+    unit = AxisUnit.of(TIME, scene)
+    times = [f"$t$ = {unit.text(time, 4)}" for time in frames.time[chosen]]
+    ends += arrange(axes, reach, times)[:, None, None, None, :]
 
     lines = membrane_lines(ends, tension, tension_scale(tension), 1.6 if len(scene.vesicles) <= FEW else 0.8)
     axes.add_collection(lines)
@@ -96,7 +100,7 @@ def draw_snapshots(
     return lines
 
 
-def _beside_each_other(axes: Axes, reach: Array, times: Array) -> Array:
+def _beside_each_other(axes: Axes, reach: Array, times: Sequence[str]) -> Array:
     """Arrange snapshots in a row with their times above them; return their centers, (snapshots, 2)."""
     top = reach[:, 1].max()
     tight = reach[:, 0] + _SPACE / 2
@@ -107,12 +111,12 @@ def _beside_each_other(axes: Axes, reach: Array, times: Array) -> Array:
     for x, half in list(zip(middle, half_width, strict=True))[1::2]:
         axes.axvspan(x - half, x + half, color=PALE, linewidth=0, zorder=0)
     for x, time in zip(middle, times, strict=True):
-        axes.annotate(_time(time), (x, top), (0, 5), textcoords="offset points", ha="center", va="bottom")
+        axes.annotate(time, (x, top), (0, 5), textcoords="offset points", ha="center", va="bottom")
     axes.set(xlim=(0, 2 * half_width.sum()), ylim=(-top - 0.1, top + 0.1))
     return np.stack([middle, np.zeros_like(middle)], axis=1)
 
 
-def _below_each_other(axes: Axes, reach: Array, times: Array) -> Array:
+def _below_each_other(axes: Axes, reach: Array, times: Sequence[str]) -> Array:
     """Arrange snapshots in a column with their times left of it; return their centers, (snapshots, 2)."""
     side = reach[:, 0].max()
     tight = reach[:, 1] + _SPACE / 2
@@ -121,13 +125,9 @@ def _below_each_other(axes: Axes, reach: Array, times: Array) -> Array:
     for y, half in list(zip(middle, half_height, strict=True))[1::2]:
         axes.axhspan(y - half, y + half, color=PALE, linewidth=0, zorder=0)
     for y, time in zip(middle, times, strict=True):
-        axes.annotate(_time(time), (-side, y), (-6, 0), textcoords="offset points", ha="right", va="center")
+        axes.annotate(time, (-side, y), (-6, 0), textcoords="offset points", ha="right", va="center")
     axes.set(xlim=(-side - 0.1, side + 0.1), ylim=(-2 * half_height.sum(), 0))
     return np.stack([np.zeros_like(middle), middle], axis=1)
-
-
-def _time(time: float) -> str:
-    return f"$t$ = {time:.4g}"
 
 
 def _cluster_areas(ends: Array, clusters: Array) -> PolyCollection:

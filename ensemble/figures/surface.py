@@ -11,7 +11,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
 from ensemble.figures.style import BLACK, STYLE, VERMILLION, WIDTH
-from ensemble.figures.symbols import axis_label, describe, number_text, quantity
+from ensemble.figures.symbols import AxisUnit, axis_label, describe, quantity
 from ensemble.search.boundary import Boundary, BoundaryPoint
 from ensemble.search.critical_value import SearchStatus
 
@@ -58,6 +58,8 @@ def _draw_curves(axes: Axes, boundary: Boundary) -> None:
     axes.set_xlabel(axis_label(first, scene))
     axes.set_ylabel(axis_label(boundary.searched, scene))
     symbols = [quantity(path, scene.flow).symbol for path in rest]
+    units = [AxisUnit.at(path, scene) for path in rest]
+    across, up = (AxisUnit.at(path, scene).size for path in (first, boundary.searched))
     lines: dict[tuple[float, ...], list[BoundaryPoint]] = {}
     for point in sorted(boundary.points, key=boundary.place):
         if None not in point.bracket:
@@ -65,14 +67,15 @@ def _draw_curves(axes: Axes, boundary: Boundary) -> None:
     shown = _evenly(len(lines), _MOST_NAMED)
     for index, (others, points) in enumerate(sorted(lines.items())):
         color = SURFACE_COLORS(index / max(len(lines) - 1, 1))
-        x = [point.parameters[first] for point in points]
-        low, high = np.array([point.bracket for point in points], dtype=float).T
+        x = across * np.array([point.parameters[first] for point in points])
+        low, high = up * np.array([point.bracket for point in points], dtype=float).T
         name = ", ".join(
-            f"${symbol}$ = {number_text(value, 4)}" for symbol, value in zip(symbols, others, strict=True)
+            f"${symbol}$ = {unit.text(value, 4)}"
+            for symbol, unit, value in zip(symbols, units, others, strict=True)
         )
         axes.plot(
             x,
-            np.array([point.critical_value for point in points], dtype=float),
+            up * np.array([point.critical_value for point in points], dtype=float),
             color=color,
             gid="curve",
             label=name if index in shown else None,
@@ -95,15 +98,19 @@ def _draw_map(figure: Figure, axes: Axes, boundary: Boundary) -> None:
     scene, swept = boundary.scene, boundary.swept
     axes.set_xlabel(axis_label(swept[0], scene))
     axes.set_ylabel(axis_label(swept[1], scene))
-    places = {boundary.place(point): point for point in boundary.points}
+    across, up = (AxisUnit.at(path, scene).size for path in swept)
+    searched = AxisUnit.at(boundary.searched, scene)
+    places = {
+        (across * at, up * other): point for point in boundary.points for at, other in [boundary.place(point)]
+    }
     x, y = (sorted(set(values)) for values in zip(*places, strict=True))
-    values = np.array([[_critical(places.get((at, other))) for at in x] for other in y])
+    values = searched.size * np.array([[_critical(places.get((at, other))) for at in x] for other in y])
     if np.isfinite(values).any() and len(x) > 1 and len(y) > 1:
         filled = axes.contourf(x, y, np.ma.masked_invalid(values), levels=14, cmap=SURFACE_COLORS)
         filled.set_gid("surface")
         bar = figure.colorbar(filled, ax=axes)
         symbol = quantity(boundary.searched, scene.flow).critical
-        bar.set_label(f"critical value ${symbol}$")
+        bar.set_label(searched.label(f"critical value ${symbol}$"))
     for gid, chosen, mark, color in (
         ("point", [at for at, point in places.items() if _converged(point)], ".", BLACK),
         ("not converged", [at for at, point in places.items() if not _converged(point)], "x", VERMILLION),

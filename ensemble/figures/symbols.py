@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection
 from dataclasses import dataclass
 
@@ -61,6 +62,7 @@ _BY_PATH = {
 _MOST_NUMBERS = 3  # that are listed
 
 _OF_THE_FLOW = "flow."
+_UNSEEN = re.compile(r"(?<=\\.)[A-Za-z]+|[${}\\]")  # a command of TeX counts as one character
 
 
 def quantity(path: str, flow: ImposedFlow | type[ImposedFlow] | None = None) -> Quantity:
@@ -85,23 +87,104 @@ def quantity(path: str, flow: ImposedFlow | type[ImposedFlow] | None = None) -> 
     return _BY_PATH.get(path, Quantity(path, upright))
 
 
-def with_unit(label: str, dimension: Dimension | None, scene: Scene) -> str:
-    """Return the label of an axis, with the unit in which its numbers are, if it is known.
+@dataclass(frozen=True)
+class AxisUnit:
+    """The unit in which a figure shows numbers of a scene and its run.
 
-    Parameters
+    Attributes
     ----------
-    label : str
-    dimension : Dimension or None
-        Of the numbers.
-    scene : Scene
-
-    Returns
-    -------
-    str
-        Such as ``gap (10 µm)``: where the axis says 2, the gap is 20 µm.
+    size : float
+        By which the numbers are multiplied; 1 if the scene does not say what its units are.
+    name : str
+        Such as ``µm``; empty without a unit.
     """
-    one = Measured.known(1.0, dimension, scene.units)
-    return label if one is None else f"{label} ({one})"
+
+    size: float = 1.0
+    name: str = ""
+
+    @classmethod
+    def of(cls, dimension: Dimension | None, scene: Scene) -> AxisUnit:
+        """Return the unit of numbers of a dimension.
+
+        Parameters
+        ----------
+        dimension : Dimension or None
+            None if they have none.
+        scene : Scene
+
+        Returns
+        -------
+        AxisUnit
+        """
+        one = Measured.known(1.0, dimension, scene.units)
+        return cls() if one is None else cls(*one)
+
+    @classmethod
+    def at(cls, path: str, scene: Scene) -> AxisUnit:
+        """Return the unit of a parameter of a scene.
+
+        Parameters
+        ----------
+        path : str
+            Dotted path of the parameter.
+        scene : Scene
+
+        Returns
+        -------
+        AxisUnit
+        """
+        return cls.of(dimension_at(scene, path), scene)
+
+    def label(self, name: str) -> str:
+        """Return the label of an axis or a color bar.
+
+        Parameters
+        ----------
+        name : str
+            Of what it shows.
+
+        Returns
+        -------
+        str
+            With the unit in brackets, if there is one.
+        """
+        return f"{name} ({self.name})" if self.name else name
+
+    def text(self, value: float, digits: int) -> str:
+        """Write a number in this unit.
+
+        Parameters
+        ----------
+        value : float
+            In the unit of the scene.
+        digits : int
+            Significant ones, at most.
+
+        Returns
+        -------
+        str
+        """
+        return f"{number_text(value * self.size, digits)} {self.name}".rstrip()
+
+    def both(self, value: float, digits: int) -> str:
+        """Write a number as it is, and in brackets in this unit, if there is one.
+
+        Parameters
+        ----------
+        value : float
+            In the unit of the scene.
+        digits : int
+            Significant ones, at most.
+
+        Returns
+        -------
+        str
+        """
+        bare = number_text(value, digits)
+        return f"{bare} ({self.text(value, digits)})" if self.name else bare
+
+
+NO_UNIT = AxisUnit()
 
 
 def axis_label(path: str, scene: Scene) -> str:
@@ -117,7 +200,7 @@ def axis_label(path: str, scene: Scene) -> str:
     -------
     str
     """
-    return with_unit(quantity(path, scene.flow).label, dimension_at(scene, path), scene)
+    return AxisUnit.at(path, scene).label(quantity(path, scene.flow).label)
 
 
 def describe(scene: Scene, without: Collection[str] = ()) -> str:
@@ -154,26 +237,45 @@ def describe(scene: Scene, without: Collection[str] = ()) -> str:
         *([scene.protocol.title] if scene.protocol else []),
     ]
     parameters = [
-        f"${quantity(path, scene.flow).symbol}$ = {_numbers(numbers)}{_in_units(path, numbers, scene)}"
+        f"${quantity(path, scene.flow).symbol}$ = {_numbers(numbers, AxisUnit.at(path, scene))}"
         for path, numbers in values.items()
         if path not in without
     ]
     return ", ".join([" ".join(subject), *parameters])
 
 
-def _in_units(path: str, numbers: list[float], scene: Scene) -> str:
-    """Return a single number with its unit in brackets, if that is known."""
-    if len(numbers) > 1:
-        return ""
-    measured = Measured.known(numbers[0], dimension_at(scene, path), scene.units)
-    return "" if measured is None else f" ({measured})"
-
-
-def _numbers(values: list[float]) -> str:
-    """Return all of a few numbers, or the smallest and largest of many."""
+def _numbers(values: list[float], unit: AxisUnit) -> str:
+    """Return all of a few numbers, or the smallest and largest of many; a single one with its unit, too."""
+    if len(values) == 1:
+        return unit.both(values[0], 6)
     if len(values) > _MOST_NUMBERS:
         return f"{number_text(values[0], 3)} to {number_text(values[-1], 3)}"
     return " and ".join(map(number_text, values))
+
+
+def broken(description: str, characters: int) -> list[str]:
+    """Break a description of a scene at its commas; what TeX does not show takes no room.
+
+    Parameters
+    ----------
+    description : str
+        As `describe` returns it.
+    characters : int
+        In a line, at most.
+
+    Returns
+    -------
+    list of str
+    """
+    lines = [""]
+    for part in description.split(", "):
+        longer = f"{lines[-1]}, {part}" if lines[-1] else part
+        if lines[-1] and len(_UNSEEN.sub("", longer)) > characters:
+            lines[-1] += ","
+            lines.append(part)
+        else:
+            lines[-1] = longer
+    return lines
 
 
 def number_text(value: float, digits: int = 6) -> str:

@@ -75,7 +75,7 @@ class AdhesionMeasurement:
                 hint = f"did you mean {similar!r}?" if similar else f"inputs: {', '.join(INPUTS)}"
                 raise ValueError(f"error: {path!r} is no input of the measurement; {hint}")
             if path.startswith("units.") and self.scene.units is None:
-                raise ValueError(f"error: {path} — the scene has no table units")
+                raise ValueError(f"error: {path} — the scene has no units, such as units.radius")
             if not 0 <= error < 1:
                 raise ValueError(f"error: {path}={error:g} — must be a fraction, at least 0 and less than 1")
 

@@ -26,7 +26,7 @@ from solver.scene import LARGEST_DENSE, Scene, Units
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from ensemble.config.figure_options import FigureOptions
+    from ensemble.config.figure_options import FigureOptions, OnPicture
     from ensemble.search.branch_summary import BranchSummary
     from ensemble.store import Store
     from ensemble.store.listing import Listing
@@ -386,7 +386,7 @@ class _StoredBranch(StoredAnswer):
 
         return branch_table(self.summary)
 
-    def draw(self, output: Path, options: FigureOptions) -> None:
+    def draw(self, output: Path, options: FigureOptions, on_progress: OnPicture | None = None) -> None:
         """Draw the bifurcation diagram."""
         from ensemble.figures import save
         from ensemble.figures.bifurcation import bifurcation_diagram

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
     from rich.table import Table
 
-    from ensemble.config.figure_options import FigureOptions
+    from ensemble.config.figure_options import FigureOptions, OnPicture
     from ensemble.mpi.usage import RunUsage
     from ensemble.search.map_record import MapRecord
     from ensemble.store import Store
@@ -269,7 +269,7 @@ class _StoredMap(StoredAnswer):
     def table(self) -> Table:
         return _table(self.record)
 
-    def draw(self, output: Path, options: FigureOptions) -> None:
+    def draw(self, output: Path, options: FigureOptions, on_progress: OnPicture | None = None) -> None:
         """Draw the phase diagram."""
         from ensemble.config.figure_options import INCH
         from ensemble.figures import map_diagram, save

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from ensemble.config.figure_options import FigureOptions
+    from ensemble.config.figure_options import FigureOptions, OnPicture
     from ensemble.display.progress import Display
     from ensemble.store import Store
     from ensemble.store.columns import ListColumn
@@ -114,7 +114,7 @@ class StoredAnswer(ABC):
         """
 
     @abstractmethod
-    def draw(self, output: Path, options: FigureOptions) -> None:
+    def draw(self, output: Path, options: FigureOptions, on_progress: OnPicture | None = None) -> None:
         """Draw the answer to a file.
 
         Parameters
@@ -123,6 +123,8 @@ class StoredAnswer(ABC):
             Its suffix names the format.
         options : FigureOptions
             Of a figure.
+        on_progress : callable, optional
+            Takes the number of pictures of a movie that are drawn, and of all.
 
         Raises
         ------

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from ensemble.config.figure_options import FigureOptions
+    from ensemble.config.figure_options import FigureOptions, OnPicture
     from ensemble.display.progress import Display
     from ensemble.store import Store
     from ensemble.store.listing import Listing
@@ -322,8 +322,9 @@ class _StoredRun(StoredAnswer):
         measured = measured_results(self.summary) | measured_fields(self.summary, document, scene.units)
         return fields_table(_results_and_cost(self.summary) | document, measured)
 
-    def draw(self, output: Path, options: FigureOptions) -> None:
+    def draw(self, output: Path, options: FigureOptions, on_progress: OnPicture | None = None) -> None:
         """Draw what happened in the run, or its movie."""
         from ensemble.figures import draw_run
 
-        draw_run(replace(self.store.load(self.summary.key), scene=self.summary.scene), output, options)
+        run = replace(self.store.load(self.summary.key), scene=self.summary.scene)
+        draw_run(run, output, options, on_progress)

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from ensemble.config.figure_options import FigureOptions
+    from ensemble.config.figure_options import FigureOptions, OnPicture
     from ensemble.display.progress import Display
     from ensemble.mpi.run_study import Snapshot, StudyResult
     from ensemble.search.boundary import Boundary
@@ -320,7 +320,7 @@ class _StoredBoundary(StoredAnswer):
 
         return boundary_table(self.boundary)
 
-    def draw(self, output: Path, options: FigureOptions) -> None:
+    def draw(self, output: Path, options: FigureOptions, on_progress: OnPicture | None = None) -> None:
         """Draw the phase diagram, with every run that is behind the boundary, or the surface."""
         from ensemble.config.figure_options import INCH
         from ensemble.figures import phase_diagram, save, surface_diagram

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
     from rich.table import Table
 
-    from ensemble.config.figure_options import FigureOptions
+    from ensemble.config.figure_options import FigureOptions, OnPicture
     from ensemble.store.unfinished import UnfinishedRun
     from solver.scene import Units
 
@@ -62,13 +62,14 @@ class UnfinishedAnswer(StoredAnswer):
 
         return fields_table(self.json_document())
 
-    def draw(self, output: Path, options: FigureOptions) -> None:
+    def draw(self, output: Path, options: FigureOptions, on_progress: OnPicture | None = None) -> None:
         """Draw what has happened so far, or its movie; see `StoredAnswer`.
 
         Parameters
         ----------
         output : Path
         options : FigureOptions
+        on_progress : callable, optional
 
         Raises
         ------
@@ -80,4 +81,4 @@ class UnfinishedAnswer(StoredAnswer):
         run = self.unfinished.run()
         if run is None:
             raise ValueError(f"run {self.unfinished.key}: its start relaxes, and there is nothing to draw")
-        draw_run(run, output, options)
+        draw_run(run, output, options, on_progress)

@@ -32,9 +32,9 @@ class ImposedFlow(Model, ABC):
     Attributes
     ----------
     kind : str
-        Tells the registered flows apart; a literal with itself as the default.
+        Which flow it is.
     rate : float
-        Scale of the velocity gradient, 1/time.  The velocity is proportional to it.
+        Scale of the velocity gradient; the velocity is proportional to it.
     title : str
         The flow in the words of a caption: "2 vesicles in …".
     symbols : mapping from field to Symbol

@@ -22,9 +22,9 @@ class Linear(UniformGradient):
     Attributes
     ----------
     rate : float
-        Sum of the rate of strain ε and the angular velocity ω, 1/time.
+        Sum of the rate of strain ε and the angular velocity ω.
     flow_type : float
-        (ε − ω)/(ε + ω), from -1 to 1.
+        Kind of the flow, (ε − ω)/(ε + ω): 1 is extension, 0 simple shear, -1 rotation.
     """
 
     kind: Literal["linear"] = "linear"

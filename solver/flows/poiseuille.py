@@ -21,7 +21,7 @@ class Poiseuille(ImposedFlow):
     Attributes
     ----------
     rate : float
-        Shear rate at the distance of the half-width from the center line y = 0, 1/time.
+        Shear rate at the distance of the half-width from the center line y = 0.
     half_width : float
         Distance from the center line at which the fluid is at rest.
     """

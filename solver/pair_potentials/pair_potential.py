@@ -29,16 +29,15 @@ class PairPotential(Model, ABC):
     Attributes
     ----------
     kind : str
-        Tells the registered potentials apart; a literal with itself as the default.
+        Which potential it is.
     hamaker : float
-        H, the strength, energy/length²; the potential is proportional to it.
+        Strength of the potential, which is proportional to it.
     adhesion_energy : float or None
-        May be given instead of H: the energy per area that two flat membranes gain, energy/length².
-        Validation turns it into H; in a validated potential it is None.
+        Energy per area that two flat membranes gain.  It may be given instead of H, which follows from it.
     distance : float
-        δ, where the potential is least: closer points repel each other, farther ones attract.
+        Distance at which the potential is least: closer points repel each other, farther ones attract.
     cutoff : float or None
-        Distance beyond which points do not attract (`solver.pair_potentials.cutoff`); None if they always do.
+        Distance from which on points no longer attract each other.  Without one they attract at any distance.
     """
 
     kind: str

@@ -20,7 +20,7 @@ class PowerLaw(PairPotential):
     Attributes
     ----------
     exponents : (int, int)
-        m and n with m > n ≥ 2.
+        Exponents m and n of repulsion and attraction, m > n ≥ 2.
     """
 
     kind: Literal["power-law"] = "power-law"

@@ -15,11 +15,11 @@ class Ramp(RateProtocol):
     Attributes
     ----------
     start, end : float
-        Multiples of the flow's rate before and after.
+        Rates before and after the change, as multiples of the flow's rate.
     begin : float
-        When it begins to change.
+        Time at which the rate begins to change.
     duration : float
-        For how long it changes.
+        Time that the change takes.
     """
 
     kind: Literal["ramp"] = "ramp"

@@ -99,7 +99,7 @@ class RateProtocol(Model, ABC):
     Attributes
     ----------
     kind : str
-        Tells the registered protocols apart; a literal with itself as the default.
+        Which protocol it is.
     title : str
         The protocol in the words of a caption: "shear flow, …".
     time_scale : str or None

@@ -18,11 +18,11 @@ class Sine(RateProtocol):
     Attributes
     ----------
     mean, amplitude : float
-        Multiples of the flow's rate.
+        Mean and amplitude of the rate, as multiples of the flow's rate.
     period : float
-        Of the oscillation.
+        Time of one oscillation.
     phase : float
-        Radians.
+        Phase at time 0, in radians.
     """
 
     kind: Literal["sine"] = "sine"

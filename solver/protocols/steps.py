@@ -20,9 +20,9 @@ class Steps(RateProtocol):
     Attributes
     ----------
     times : tuple of float
-        When it jumps, in ascending order.
+        Times at which the rate jumps, in ascending order.
     factors : tuple of float
-        The multiples: the first one up to the first time, each other one from a time on.
+        Multiples of the flow's rate: one up to the first time, and one from each time on.
     """
 
     kind: Literal["steps"] = "steps"

@@ -28,13 +28,13 @@ class Lattice(Model):
     Attributes
     ----------
     columns, rows : int
-        How many vesicles along x and along y.
+        Number of vesicles along x and along y.
     spacing : (2,)
         Distance of neighboring centers along x and y.
     staggered : bool
         Whether every second row is shifted by half a spacing.
     vesicle : Vesicle
-        The one that is repeated; the lattice has its middle at the center of this one.
+        Vesicle that is repeated; its center is the middle of the lattice.
     """
 
     kind: Literal["lattice"] = "lattice"
@@ -77,19 +77,19 @@ class Random(Model):
     Attributes
     ----------
     count : int
-        How many vesicles.
+        Number of vesicles.
     area_fraction : float
-        Area of all vesicles over that of the square.
+        Area of all vesicles over that of the square in which they are placed.
     seed : int
-        Equal seeds place and draw equal vesicles.
+        Number from which places and random values are drawn; equal seeds give equal vesicles.
     minimum_distance : float
-        Between the ellipses.
+        Smallest distance between two vesicles at the start.
     reduced_area, length : float, Uniform or Normal
-        As of `Vesicle`: one value for all, or how the values are distributed.
+        That of the vesicles: one value for all, or how the values are distributed.
     angle : float or None
-        Of the long axes against x, radians; None for random ones.
+        Angle of all long axes against x, in radians.  Without one each vesicle gets a random angle.
     bending_modulus, viscosity_contrast : float
-        As of `Vesicle`.
+        That of all vesicles.
     """
 
     kind: Literal["random"] = "random"

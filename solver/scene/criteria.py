@@ -18,19 +18,17 @@ class Criteria(Model):
     Attributes
     ----------
     separated_distance : float
-        Center distance beyond which a pair that moves apart is separated; 1.5 times the first distance if
-        that is more.
+        Distance of the centers beyond which a pair that moves apart counts as separated; at least 1.5 times
+        the distance at the start.
     revolutions : int
-        Full turns that the line of centers of a bound pair has made at least, or the long axis of a tumbling
-        vesicle.
+        Full turns that a pair must make to count as bound, or a vesicle to count as tumbling.
     settled_change : float
-        A motion that revolves has settled if durations of its half turns, and largest center distances in
-        them, change relatively by no more, from one to the next or from every other one to the next, and by
-        no more in all that follow.
+        Largest relative change, from one half turn to the next or to the next but one, of its duration and of
+        the largest center distance in it, at which a turning motion counts as settled.
     steady_rate : float
-        A state is steady if no tangent angle and no center changes faster.
+        Largest rate of change of tangent angles and centers at which a state counts as steady.
     steady_time : float
-        For at least this long.
+        Time for which a state must remain so to count as steady.
     """
 
     separated_distance: Annotated[Positive, LENGTH] = 12.0

@@ -21,7 +21,7 @@ class Uniform(Model):
     Attributes
     ----------
     low, high : float
-        Ends of the interval.
+        Smallest and largest value.
     """
 
     kind: Literal["uniform"] = "uniform"
@@ -60,7 +60,7 @@ class Normal(Model):
     Attributes
     ----------
     mean : float
-        Also the median.
+        Mean, which is also the median.
     deviation : float
         Standard deviation before the tails are cut off.
     """

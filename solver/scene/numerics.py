@@ -19,21 +19,21 @@ class Numerics(Model):
     Attributes
     ----------
     points : int or "auto"
-        On each vesicle; "auto" for as many as the tolerance needs, and more when a run comes to need them.
+        Points on each vesicle, or "auto": as many as the tolerance needs, and more when a run needs them.
     tolerance : float
-        Estimated local error allowed in a step, absolute, of tangent angles (radians) and centers.
+        Largest estimated error of a step, absolute, in tangent angles (radians) and centers.
     integrator : str
-        Method of integration in time; "auto" for the fastest one.
+        Method of integration in time, or "auto": the fastest one.
     order : int or None
-        Of "sdc"; None for its usual one.
+        Order of the integrator "sdc".  Without one it has its usual order.
     step_control : str
-        "embedded" for the estimated error of each step; "area-length" for the drift of areas and lengths over
-        the run (Quaife & Biros 2016).
+        What steps are chosen by: "embedded", the estimated error of each step, or "area-length", the drift of
+        areas and lengths over the run (Quaife & Biros 2016).
     work_limit : int
-        Evaluations of the equation of motion after which a run is given up.
+        Number of evaluations of the equation of motion after which a run is given up.
     wall_limit : float or None
-        Seconds of wall-clock time after which a run is given up, measured after every step; None for none.
-        It depends on the machine whether a run reaches it.  A run that does not is not changed by it.
+        Seconds of computing after which a run is given up; without it none is.  Whether a run reaches it
+        depends on the machine.  A run that does not is not changed by it.
     """
 
     points: Annotated[int, Field(ge=16, le=1024, multiple_of=2)] | Literal["auto"] = 64

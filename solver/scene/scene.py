@@ -44,20 +44,19 @@ class Scene(Model):
     Attributes
     ----------
     units : Units or None
-        What the units are, for numbers that are given or shown with a unit.  No result depends on them.
+        What the units are: with them numbers may be given, and are shown, with a unit.  No result changes.
     horizon : float
-        Time at which a run ends that is not decided before.  A run that is decided ends at once.
+        Time at which a run ends unless its outcome is decided earlier.
     arrangement : Arrangement or None
-        May be given instead of the vesicles.  Validation turns it into these; in a validated scene it is
-        None.
+        Rule that places many vesicles, instead of a list of them.
     vesicles : tuple of Vesicle
-        At least one.
+        Vesicles with their places, at least one.
     adhesion : Adhesion or None
-        None if nothing adheres.
+        Attraction between the membranes of different vesicles.  Without one they do not adhere.
     flow : ImposedFlow or None
-        None if the fluid is quiescent.
+        Flow far from the vesicles.  Without one the fluid is at rest.
     protocol : RateProtocol or None
-        How the rate of the flow changes with time; None if it does not.
+        How the rate of the flow changes with time.  Without one it is constant.
     start : Start
         How a run begins.
     numerics : Numerics

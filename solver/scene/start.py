@@ -20,11 +20,11 @@ class RandomWaves(Model):
     Attributes
     ----------
     amplitude : float
-        Root mean square of the change of tangent angles, radians.
+        Root mean square of the change of tangent angles, in radians.
     seed : int
-        Equal seeds make equal waves.
+        Number from which the waves are drawn; equal seeds give equal waves.
     waves : int
-        The most waves on a membrane.
+        Largest number of waves along a membrane.
     """
 
     amplitude: Annotated[Positive, ANGLE]
@@ -60,14 +60,14 @@ class Start(Model):
     Attributes
     ----------
     relaxed : bool
-        Whether the pair relaxes to equilibrium first and is then rotated, so that its line of centers lies on
-        the diverging axis y plus ``tilt``.
+        Whether a pair first comes to equilibrium without flow and is then turned, its line of centers along
+        the axis y, in which the trap pulls.
     horizon : float
-        Time by which the relaxation must have come to rest.
+        Time by which the pair must have come to equilibrium.
     tilt : float
-        Any angle, radians.
+        Angle, in radians, by which the relaxed pair is turned away from that axis.
     deformation : RandomWaves or None
-        Of the vesicles as placed; None leaves them as they are.
+        Small random deformation of the vesicles as placed.  Without one they keep their shapes.
     """
 
     relaxed: bool = False

@@ -39,13 +39,13 @@ class Units(Model):
     Attributes
     ----------
     radius : str or None
-        The unit of length, which is the length of a vesicle over 2π, such as ``10 um``.
+        Unit of length, such as ``10 um``: the radius of a circle of the perimeter of a vesicle.
     length : str or None
-        2π units of length, instead of the radius.
+        Perimeter of a vesicle, 2π units of length; may be given instead of the radius.
     bending_modulus : str
-        The unit of bending moduli, such as ``1e-19 J``: of the membrane in three dimensions.
+        Bending modulus of a membrane (in three dimensions), such as ``1e-19 J``.
     viscosity : str
-        Of the fluid outside, such as ``1 mPa*s``.
+        Viscosity of the fluid outside, such as ``1 mPa*s``.
     """
 
     radius: _Length | None = None

@@ -28,7 +28,7 @@ class Vesicle(Model):
     Attributes
     ----------
     reduced_area : float
-        4π·area/length².
+        Area over that of a circle of the same perimeter, 4π·area/length²; 1 is a circle.
     length : float
         Perimeter of the membrane.
     bending_modulus : float
@@ -36,13 +36,13 @@ class Vesicle(Model):
     viscosity_contrast : float
         Viscosity of the fluid inside over that outside.
     center : (2,)
-        Position, x and y.
+        Where the vesicle starts, x and y.
     angle : float
-        Of the long axis against x, radians; with a shape of its own, that by which the shape is turned.
+        Angle of the long axis against x, in radians, at the start.  A shape of its own is turned by it.
     tangent_angle : tuple of float or None
         The shape in which it starts instead of an ellipse: tangent angles at points equispaced in arclength,
-        counterclockwise, radians, continued beyond ±π instead of jumping.  `ensemble start-from` writes them.
-        Their reduced area may differ by 0.01 from the one above, which counts.
+        counterclockwise, in radians, continued beyond ±π instead of jumping.  `ensemble start-from` writes
+        them.  Their reduced area may differ by 0.01 from the one stated, which counts.
     """
 
     reduced_area: float = Field(0.9, gt=0, le=1)

@@ -29,10 +29,12 @@ from ensemble.store import Store
 from solver import Simulation
 from solver.analysis.run import Outcome, Run
 from solver.flows import FLOWS
+from solver.scene import Units
 from tests.api.processes import wait_until
 from tests.api.servers import make_token, serving
 from tests.api.services import service, start_service
-from tests.ensemble.runs import shear_run
+from tests.api.stores import example_boundary
+from tests.ensemble.runs import shear_run, shear_scene
 from tests.solver.restarts import PAIR
 
 # The default of 5 s is too short on a busy machine.
@@ -52,6 +54,11 @@ window.violations = [];
 document.addEventListener("securitypolicyviolation", ({ effectiveDirective, blockedURI, sourceFile }) =>
     window.violations.push(`${effectiveDirective} ${blockedURI} ${sourceFile}`));
 """
+UNITS = {
+    "radius R that is the unit of length": "10 um",
+    "bending modulus κ that is the unit": "1e-19 J",
+    "viscosity μ of the fluid": "1 mPa*s",
+}
 QUICK_STUDY = {
     "values of the shear rate": "0.5",
     "relative width of a bracket": "0.025",
@@ -561,7 +568,7 @@ def test_flow_potential_and_integrator_are_chosen_from_menus(page: Page, url: st
     }
     page.wait_for_url("**/#/jobs/*")
     page.get_by_role("button", name="Cancel").click()
-    expect(page.locator(".job-status")).to_contain_text("dismissed")
+    expect(page.locator(".job-status")).to_contain_text("canceled")
     # Again the same, or with changes.
     before = page.url
     page.get_by_role("button", name="Submit again").click()
@@ -578,6 +585,49 @@ def test_flow_potential_and_integrator_are_chosen_from_menus(page: Page, url: st
     expect(page.get_by_role("button", name="Submit")).to_be_enabled()
 
 
+def test_a_number_that_is_refused_leads_to_what_it_needs(page: Page, url: str) -> None:
+    page.goto(f"{url}/#/new?preset=doublet-shear")
+    rate = page.get_by_label("shear rate γ̇")
+    rate.fill("0,5")
+    expect(rate).to_have_accessible_description(re.compile("write a decimal point: '0.5'"))
+    radius = page.get_by_label("radius R that is the unit of length")
+    expect(radius).not_to_be_visible()
+    rate.fill("0.05 1/s")
+    expect(rate).to_have_accessible_description(re.compile("units.radius .* and units.viscosity"))
+    expect(radius).to_be_visible()
+    expect(radius).to_have_accessible_description(re.compile("see shear rate"))
+    for label, value in UNITS.items():
+        page.get_by_label(label).fill(value)
+    expect(page.get_by_role("button", name="Submit")).to_be_enabled()
+
+
+def test_numbers_are_shown_with_their_units(page: Page, url: str, store: Path) -> None:
+    units = Units(radius="10 um", bending_modulus="1e-19 J", viscosity="1 mPa*s")
+    run = shear_run(shear_scene(rate=0.7).model_copy(update={"units": units}))
+    boundary = example_boundary().in_units(units).model_copy(update={"study_key": "0123456789abcdef"})
+    with Store.open(store) as opened:
+        key = opened.save(run)
+        opened.save_boundary(boundary)
+    page.goto(f"{url}/#/runs/{key}")
+    results = page.locator(".results")
+    expect(results).to_contain_text(f"{run.gap:.4g} ({10 * run.gap:.4g} µm)")
+    expect(results).to_contain_text(f"Period{run.period:.4g} ({10 * run.period:.4g} s)")
+    page.locator(".histories .main-svg").first.wait_for()
+    expect(page.locator(".histories")).to_contain_text("gap (µm)")
+    traces = page.locator(".histories .plot").evaluate("plot => plot.data")
+    assert traces[0]["x"] == pytest.approx((10 * run.series["time"]).tolist())
+    assert traces[0]["y"] == pytest.approx((10 * run.series["gap"]).tolist())
+    page.locator(".player canvas").press("End")
+    assert page.locator(".player .clock").inner_text() == "t = 9.0 (90.0 s)"
+    page.goto(f"{url}/#/boundaries/{boundary.study_key}")
+    expect(page.locator(".diagram")).to_contain_text("shear rate γ̇ (1/s)")
+    low, high = (100 * end for end in boundary.points[1].bracket)
+    expect(page.get_by_role("table", name="Points")).to_contain_text(f"({low:.2f} – {high:.2f} µPa)")
+    page.get_by_label("At shear rate γ̇ in 0.1 1/s").fill("0.5")
+    page.get_by_role("button", name="Read").click()
+    expect(page.locator("dd").first).to_contain_text("µPa)")
+
+
 def test_a_protocol_of_the_rate_is_chosen_from_a_menu(page: Page, url: str) -> None:
     """A scene without one does not have the field at all."""
     page.goto(f"{url}/#/new?preset=vesicle-shear")
@@ -591,7 +641,7 @@ def test_a_protocol_of_the_rate_is_chosen_from_a_menu(page: Page, url: str) -> N
     assert (changed["kind"], changed["duration"]) == ("ramp", 20)
     page.wait_for_url("**/#/jobs/*")
     page.get_by_role("button", name="Cancel").click()
-    expect(page.locator(".job-status")).to_contain_text("dismissed")
+    expect(page.locator(".job-status")).to_contain_text("canceled")
 
 
 def test_addresses_without_a_view_lead_back(page: Page, url: str) -> None:
@@ -682,8 +732,12 @@ def test_a_job_is_canceled(page: Page, url: str) -> None:
     row = page.get_by_role("row").filter(has=page.locator(f"#job-{job['id']}"))
     expect(row).to_contain_text("running")
     row.get_by_role("button", name="Cancel").click()
-    expect(row).to_contain_text("dismissed")
+    expect(row).to_contain_text("canceled")
     expect(row.get_by_role("button")).to_have_count(0)
+    expect(row.get_by_role("link")).to_have_count(1)  # to the job: it has no result
+    page.goto(f"{url}/#/jobs/{job['id']}")
+    expect(page.locator("main")).to_contain_text("canceled")
+    assert page.locator("main").inner_text().count("canceled") == 1
     assert httpx2.get(f"{url}/jobs/{job['id']}").json()["status"] == "dismissed"
 
 
@@ -706,7 +760,13 @@ def test_runs_are_filtered(page: Page, url: str, store: Path) -> None:
     page.get_by_label("Outcome").select_option("bound")
     page.get_by_label("Conditions").fill(", ".join(conditions))
     page.get_by_role("button", name="Filter").click()
-    expect(page.get_by_role("link", name="Play")).to_have_count(len(found))
+    expect(page.locator("main").get_by_role("link", name=re.compile("^[0-9a-f]{8}$"))).to_have_count(
+        len(found)
+    )
+    example = page.get_by_label("Conditions")
+    page.set_viewport_size(NARROW)
+    example.fill(str(example.get_attribute("placeholder")))
+    assert example.evaluate("input => input.scrollWidth <= input.clientWidth"), "the example is cut"
     page.get_by_label("Conditions").fill("flow.speed>1")
     page.get_by_role("button", name="Filter").click()
     expect(page.get_by_role("alert")).to_contain_text("flow.speed")

@@ -4,7 +4,7 @@ import { eventsOf, get, getText } from "../api.js";
 import { followBoundary } from "../boundary.js";
 import { definitions, element } from "../dom.js";
 import { dateAndTime, duration, words } from "../format.js";
-import { againButtons, cancelButton, isUnfinished, progressOf, resultLink } from "../job.js";
+import { againButtons, cancelButton, isUnfinished, progressOf, resultLink, stateOf } from "../job.js";
 import { kindNamed } from "../kinds.js";
 import { alertAbout, messageOf } from "../problems.js";
 
@@ -50,6 +50,7 @@ export async function showJob({ content, parameters, signal }) {
 
 /** @param {Job} job */
 function heading(job) {
+  const state = stateOf(job);
   const seconds =
     job.started && job.finished ? (Date.parse(job.finished) - Date.parse(job.started)) / 1000 : null;
   return [
@@ -63,10 +64,10 @@ function heading(job) {
     element(
       "div",
       { class: "job-status", role: "status" },
-      element("span", { class: `state ${job.status}` }, job.status),
+      state,
       progressOf(job),
     ),
-    job.message ? element("p", { class: job.status === "failed" ? "alert" : "note" }, job.message) : "",
+    job.message && job.message !== state.textContent ? element("p", { class: job.status === "failed" ? "alert" : "note" }, job.message) : "",
     definitions([
       ["Submitted", dateAndTime(job.created)],
       ["Took", seconds === null ? null : duration(seconds)],

@@ -3,7 +3,7 @@
 import { changesOf, get } from "../api.js";
 import { element, tableRow } from "../dom.js";
 import { dateAndTime, words } from "../format.js";
-import { cancelButton, progressOf, resultLink } from "../job.js";
+import { cancelButton, progressOf, resultLink, stateOf } from "../job.js";
 import { alertAbout } from "../problems.js";
 
 /** @typedef {import("../job.js").Job} Job */
@@ -78,7 +78,7 @@ function showPage(body, jobs) {
 function row(job) {
   return tableRow(COLUMNS, [
     element("a", { id: `job-${job.id}`, href: `#/jobs/${job.id}` }, words(job.name)),
-    element("span", { class: `state ${job.status}` }, job.status),
+    stateOf(job),
     progressOf(job),
     dateAndTime(job.created),
     resultLink(job),

@@ -15,6 +15,7 @@ import { Problem } from "../problems.js";
 import { keepInAddress } from "../router.js";
 import { seriesOf } from "../series.js";
 import { describe } from "../symbols.js";
+import { Units } from "../units.js";
 import { watchRun } from "./unfinished_run.js";
 
 /** @param {import("../router.js").Place} place */
@@ -36,17 +37,18 @@ export async function showRun(place) {
 async function showFinishedRun({ content, parameters, query, signal }) {
   const { key } = parameters;
   const run = await get(`/runs/${key}`, signal);
+  const units = await Units.of(`/runs/${key}`, run.scene, signal);
   document.title = `Run ${key.slice(0, 8)}: ${run.outcome} – Vesicle ensemble`;
   const stage = element("div", { class: "stage" });
   const plots = element("div", { class: "plot" });
   content.replaceChildren(
-    heading(run),
+    heading(run, units),
     element(
       "div",
       { class: "columns run" },
       stage,
       element("div", { class: "histories" }, plots),
-      results(run),
+      results(run, units),
     ),
     sceneOf(run),
   );
@@ -59,16 +61,16 @@ async function showFinishedRun({ content, parameters, query, signal }) {
   ]);
   loading.remove();
   const plot = new Plot(plots, signal);
-  const drawn = plot.draw(() => histories(series, run.scene));
+  const drawn = plot.draw(() => histories(series, run.scene, units));
   if (frames.states.length === 0) {
     stage.append(element("p", { class: "alert" }, "This run has no recorded state that can be drawn."));
     return drawn;
   }
-  const player = new Player(frames, flow, run.scene, signal);
+  const player = new Player(frames, flow, run.scene, units, signal);
   stage.append(player.element);
   player.canvas.setAttribute("aria-label", `${describe(run.scene)}: membranes colored by tension`);
   keepTime(player, query);
-  await link(player, plot, drawn);
+  await link(player, plot, drawn, units.size("time").value);
 }
 
 /**
@@ -77,14 +79,15 @@ async function showFinishedRun({ content, parameters, query, signal }) {
  * @param {Player} player
  * @param {Plot} plot
  * @param {Promise<void>} drawn - Resolved when the plots are drawn.
+ * @param {number} one - What the axis of time says for a time of one.
  */
-async function link(player, plot, drawn) {
+async function link(player, plot, drawn, one) {
   const cursor = new Cursor(plot.place, MARGIN);
   plot.place.after(cursor.line);
-  plot.on("plotly_click", ({ points: [point] }) => player.rest(point.x));
-  plot.on("plotly_afterplot", () => cursor.show(player.time)); // after zooming, resizing or changing colors
+  plot.on("plotly_click", ({ points: [point] }) => player.rest(point.x / one));
+  plot.on("plotly_afterplot", () => cursor.show(player.time * one)); // after zooming, resizing or changing colors
   await drawn;
-  player.onTime((time) => cursor.show(time));
+  player.onTime((time) => cursor.show(time * one));
 }
 
 /**
@@ -100,15 +103,18 @@ function keepTime(player, query) {
   player.onRest((time) => keepInAddress("time", time.toFixed(2)));
 }
 
-/** @param {any} run */
-function heading({ key, outcome, time, scene, failure }) {
+/**
+ * @param {any} run
+ * @param {Units} units
+ */
+function heading({ key, outcome, time, scene, failure }, units) {
   const verb = ["completed", "undecided", "failed"].includes(outcome) ? "ended" : "decided";
   return element(
     "div",
     { class: "heading" },
     element("h1", {}, outcomeLabel(outcome)),
     element("a", { class: "button", href: `#/new?run=${key}` }, "Run again with changes"),
-    element("p", {}, `${describe(scene)}; ${verb} at t = ${number(time)}`),
+    element("p", {}, `${describe(scene, [], units)}; ${verb} at t = ${units.both("time", time)}`),
     downloads(`/runs/${key}/file`, `run-${key.slice(0, 8)}`, [
       ["gif", "movie"],
       ["svg", "figure"],
@@ -119,35 +125,42 @@ function heading({ key, outcome, time, scene, failure }) {
   );
 }
 
-/** @param {any} run */
-function results({ configuration, period, gap, inclination_angle, viscosity, energy, arrangement, error, work }) {
-  /** @type {(value: any, error: any) => string | null} */
-  const withError = (value, error) => {
+/**
+ * @param {any} run
+ * @param {Units} units
+ */
+function results({ configuration, period, gap, inclination_angle, viscosity, energy, arrangement, error, work }, units) {
+  /** @type {(value: any, error: any, name?: string) => string | null} */
+  const withError = (value, error, name = "") => {
     if (value === null || value === undefined) return null;
-    return error === null || error === undefined ? number(value) : `${number(value)} ± ${number(error, 1)}`;
+    const hasError = error !== null && error !== undefined;
+    // With a unit the error takes the same factor as the value.
+    const write = (/** @type {number} */ shown) =>
+      hasError ? `${number(shown)} ± ${number(value ? (error * shown) / value : error, 1)}` : number(shown);
+    return units.both(name, value, write);
   };
-  const orNull = (/** @type {any} */ value) => (value === null || value === undefined ? null : number(value));
+  const orNull = (/** @type {any} */ value, name = "") => withError(value, null, name);
   return element(
     "section",
     { class: "results" },
     element("h2", {}, "Results"),
     definitions([
       ["Configuration", configuration ?? null],
-      ["Period", withError(period, error.period)],
+      ["Period", withError(period, error.period, "period")],
       ["Slides open by a factor", orNull(arrangement?.opening)],
       ["Own turns in a turn", arrangement?.own_turns?.map((/** @type {number} */ own) => number(own)).join(", ") ?? null],
       ["Bow of the contact", orNull(arrangement?.bow)],
       ["Twist of the contact", orNull(arrangement?.twist)],
-      ["Gap", orNull(gap)],
+      ["Gap", orNull(gap, "gap")],
       ["Inclination", inclination_angle === null ? null : `${withError(inclination_angle, error.inclination_angle)}°`],
       ["Viscosity [μ]", withError(viscosity?.total, error.viscosity)],
       ["– bending + tension", orNull(viscosity?.bending_tension)],
       ["– adhesion", orNull(viscosity?.adhesion)],
       ["– viscosity contrast", orNull(viscosity?.contrast)],
-      ["Bending energy", orNull(energy.bending)],
-      ["Adhesion energy", orNull(energy.adhesion)],
-      ["Binding energy", orNull(energy.binding)],
-      ["Position error", orNull(error.global)],
+      ["Bending energy", orNull(energy.bending, "bending_energy")],
+      ["Adhesion energy", orNull(energy.adhesion, "adhesion_energy")],
+      ["Binding energy", orNull(energy.binding, "adhesion_energy")],
+      ["Position error", orNull(error.global, "x")],
       ["Area error", number(error.area, 2)],
       ["Closure error", number(error.closure, 2)],
       ["Local errors, summed", number(error.temporal, 2)],

@@ -6,7 +6,7 @@ import { dateAndTime, number } from "../format.js";
 import { submitButton } from "../job.js";
 import { MARKS, outcomeLabel } from "../outcomes.js";
 import { alertAbout } from "../problems.js";
-import { goTo } from "../router.js";
+import { goTo, runLink } from "../router.js";
 import { describe } from "../symbols.js";
 
 const COLUMNS = ["Outcome", "Scene", "Integrator", "Points", "Time", "Made", "Run"];
@@ -66,7 +66,7 @@ function row({ key, outcome, configuration, scene, time, created, work, report }
     number(work.points),
     number(time),
     dateAndTime(created),
-    element("a", { href: `#/runs/${key}` }, "Play"),
+    runLink(key),
   ]);
 }
 

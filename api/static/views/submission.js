@@ -105,7 +105,7 @@ function choices(presets, current) {
                 {},
                 [
                   wanted.has_many_runs ? `up to ${estimate.runs} runs` : contents(sceneIn(document, wanted)),
-                  estimate.seconds === null ? "" : `about ${roughly(estimate.seconds)}`,
+                  estimate.seconds === null ? "" : roughly(estimate.seconds),
                 ]
                   .filter(Boolean)
                   .join(", "),
@@ -155,6 +155,7 @@ class SubmissionForm {
   constructor(template, form, signal) {
     this.template = template;
     this.signal = signal;
+    this.prefix = form.prefix;
     this.inputs = form.fields.map((field) => new FieldInput(field));
     this.unions = form.unions.map((union) => new UnionInput(union, form));
     this.further = new FurtherChanges();
@@ -255,10 +256,18 @@ class SubmissionForm {
    */
   #mark(problems) {
     const unplaced = new Set(problems);
-    for (const input of [...this.inputs, ...this.unions].flatMap((each) => each.inputs)) {
-      const named = problems.filter((problem) => isAbout(problem, input.field.path));
+    const inputs = [...this.inputs, ...this.unions].flatMap((each) => each.inputs);
+    const subjects = new Map(problems.map((problem) => [problem, inputs.find(({ field }) => isOf(problem, field.path))]));
+    for (const input of inputs) {
+      const { path } = input.field;
+      const inScene = path.startsWith(this.prefix) ? path.slice(this.prefix.length) : path;
+      const named = problems.filter((problem) => [path, inScene].some((name) => isAbout(problem, name)));
       named.forEach((problem) => unplaced.delete(problem));
-      input.mark(named.map((problem) => reasonIn(problem, input.field.path)).join("; "));
+      const reasons = named.map((problem) => {
+        const subject = subjects.get(problem) ?? input;
+        return subject === input ? reasonIn(problem, path) : `see ${subject.field.label}`;
+      });
+      input.mark([...new Set(reasons)].join("; "));
     }
     return [...unplaced];
   }
@@ -289,7 +298,7 @@ function runsAndTime({ runs, ranks, seconds }) {
   return seconds === null
     ? `${count} on ${on}; how long ${runs === 1 ? "it takes" : "they take"} is known after the first runs like ` +
         `${runs === 1 ? "it" : "them"}`
-    : `${count}, about ${roughly(seconds)} on ${on}`;
+    : `${count}, ${roughly(seconds)} on ${on}`;
 }
 
 /**
@@ -312,14 +321,32 @@ function excessOf({ cost, maximum, recorded, most_recorded, memory, most_memory,
 }
 
 /**
- * Whether a problem is about the field at a path, or about one in its place in a single vesicle.
+ * Whether a problem names the field at a path, or one in its place in a single vesicle.
  *
  * @param {string} problem
  * @param {string} path
  */
 function isAbout(problem, path) {
-  const general = problem.replaceAll(/\.\d+(?=\.)/g, "");
-  return [problem, general].some((text) => text.split(/[\s:;]+/).includes(path));
+  return readings(problem).some((text) => text.split(/[\s:;,()]+/).includes(path));
+}
+
+/**
+ * Whether a problem is that of the field at a path, which it begins with.
+ *
+ * @param {string} problem
+ * @param {string} path
+ */
+function isOf(problem, path) {
+  return readings(problem).some((text) => text.startsWith(`${path}:`));
+}
+
+/**
+ * A problem as it is, and without the numbers of single vesicles and values.
+ *
+ * @param {string} problem
+ */
+function readings(problem) {
+  return [problem, problem.replaceAll(/\.\d+(?=[.:])/g, "")];
 }
 
 /**
@@ -329,6 +356,6 @@ function isAbout(problem, path) {
  * @param {string} path
  */
 function reasonIn(problem, path) {
-  const reason = problem.startsWith(path) ? problem.slice(problem.indexOf(": ") + 2).split(" — ").pop() : problem;
+  const reason = isOf(problem, path) ? problem.slice(problem.indexOf(": ") + 2).split(" — ").pop() : problem;
   return /** @type {string} */ (reason).replaceAll("input should be", "must be");
 }

@@ -2,12 +2,13 @@
 
 import { get } from "../api.js";
 import { definitions, element } from "../dom.js";
-import { dateAndTime, duration, number } from "../format.js";
+import { dateAndTime, duration } from "../format.js";
 import { histories } from "../history.js";
 import { Plot } from "../plot.js";
 import { Problem } from "../problems.js";
 import { seriesOf } from "../series.js";
 import { describe } from "../symbols.js";
+import { Units } from "../units.js";
 
 const GONE = [404, 409]; // the record of a run that is being finished cannot be read
 const SECONDS_BETWEEN_LOOKS = 5; // checkpoints come once a minute or so
@@ -22,21 +23,22 @@ export async function watchRun({ content, parameters, signal }) {
   const address = `/unfinished-runs/${parameters.key}`;
   const [head, plots] = [element("div", {}), element("div", { class: "plot" })];
   const plot = new Plot(plots, signal);
-  let written = null;
+  let [written, units] = [null, new Units()];
   for (;;) {
     const run = await unlessMissing(get(address, signal));
     if (run === null) {
       return written !== null;
     }
     if (run.written !== written) {
+      units = written === null ? ((await unlessMissing(Units.of(address, run.scene, signal))) ?? units) : units;
       const series = run.samples > 0 ? await unlessMissing(seriesOf(address, signal)) : null;
-      head.replaceChildren(...heading(run));
+      head.replaceChildren(...heading(run, units));
       if (written === null) {
         document.title = `Run ${parameters.key.slice(0, 8)} – Vesicle ensemble`;
         content.replaceChildren(head, element("div", { class: "histories" }, plots));
       }
       if (series) {
-        await plot.draw(() => histories(series, run.scene));
+        await plot.draw(() => histories(series, run.scene, units));
       }
       written = run.written;
     }
@@ -44,14 +46,17 @@ export async function watchRun({ content, parameters, signal }) {
   }
 }
 
-/** @param {any} run */
-function heading({ status, written, time, horizon, wall_seconds: seconds, samples, frames, scene }) {
+/**
+ * @param {any} run
+ * @param {Units} units
+ */
+function heading({ status, written, time, horizon, wall_seconds: seconds, samples, frames, scene }, units) {
   return [
     element(
       "div",
       { class: "heading" },
       element("h1", {}, status === "in progress" ? "In progress" : "Interrupted"),
-      element("p", {}, describe(scene)),
+      element("p", {}, describe(scene, [], units)),
     ),
     element(
       "div",
@@ -60,7 +65,7 @@ function heading({ status, written, time, horizon, wall_seconds: seconds, sample
       element(
         "span",
         {},
-        time === null ? "the start relaxes" : `t = ${number(time)} of ${number(horizon)} at the latest`,
+        time === null ? "the start relaxes" : `t = ${units.both("time", time)} of ${units.both("time", horizon)} at the latest`,
       ),
     ),
     definitions([

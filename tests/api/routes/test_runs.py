@@ -18,11 +18,13 @@ from api.auth.tokens import Tokens
 from api.database.service_database import Database
 from api.results.run_arrays import FrameSelection
 from api.settings import Settings
+from ensemble.config.measured import measured_fields
 from ensemble.store import Store
 from solver.analysis.run import Outcome
 from solver.membrane.curve import positions
+from solver.scene import Units
 from tests.api.servers import client_of, make_token
-from tests.api.stores import FRAMES, RATES
+from tests.api.stores import FRAMES, RATES, example_boundary
 from tests.ensemble.group_files import pack, unpack
 from tests.ensemble.runs import shear_run, shear_scene
 
@@ -230,7 +232,29 @@ def test_a_fluid_at_rest_has_no_flow(reading):
     assert reading.get(f"/runs/{failed['key']}/flow").json() is None
 
 
-@pytest.mark.parametrize("part", ["", "/series", "/frames", "/flow"])
+def test_a_number_times_the_size_of_its_unit_is_what_the_terminal_shows(tmp_path, reading, bound_run):
+    units = Units(radius="10 um", bending_modulus="1e-19 J", viscosity="1 mPa*s")
+    with Store.open(tmp_path / "store") as store, client_of(store.path) as client:
+        key = store.save(shear_run(shear_scene().model_copy(update={"units": units})))
+        sizes = client.get(f"/runs/{key}/units").json()["sizes"]
+        summary = store.summary(key)
+        document = summary.document()
+        boundary = example_boundary().in_units(units)
+        store.save_boundary(boundary)
+        of_boundary = client.get(f"/boundaries/{boundary.study_key}/units").json()["sizes"]
+    shown = measured_fields(summary, document, units)
+    for name in ("time", "period", "gap"):
+        assert sizes[name]["value"] * document[name] == pytest.approx(shown[name].value, rel=1e-12)
+        assert sizes[name]["unit"] == shown[name].unit
+    assert sizes["bending_energy"]["unit"] == shown["energy.bending"].unit
+    point = boundary.measured()[0]["critical_value"]
+    size = of_boundary["adhesion.hamaker"]
+    assert size["value"] * boundary.points[0].critical_value == pytest.approx(point.value, rel=1e-12)
+    assert (size["unit"], of_boundary["flow.rate"]["unit"]) == (point.unit, "1/s")
+    assert reading.get(f"/runs/{bound_run}/units").json() == {"sizes": {}}
+
+
+@pytest.mark.parametrize("part", ["", "/series", "/frames", "/flow", "/units"])
 def test_what_never_changes_is_sent_once(reading, bound_run, part):
     first = reading.get(f"/runs/{bound_run}{part}")
     assert "immutable" in first.headers["cache-control"]
@@ -365,7 +389,7 @@ def test_long_answers_are_compressed_and_short_ones_and_numbers_are_not(reading,
     assert "accept-encoding" in reading.get("/runs").headers["vary"].lower()
 
 
-@pytest.mark.parametrize("part", ["", "/series", "/frames", "/flow"])
+@pytest.mark.parametrize("part", ["", "/series", "/frames", "/flow", "/units"])
 def test_an_unknown_run_is_not_found(reading, part):
     response = reading.get(f"/runs/{'0' * 32}{part}")
     assert response.status_code == 404

@@ -53,6 +53,7 @@ def test_it_says_how_far_it_is(reading: httpx2.Client, unfinished: str) -> None:
     assert 0 < document["time"] < document["horizon"] == SCENE.horizon
     assert document["scene"]["flow"]["rate"] == SCENE.flow.rate
     assert document["last"]["gap"] > 0
+    assert reading.get(f"/unfinished-runs/{unfinished}/units").json() == {"sizes": {}}
 
 
 def test_its_series_are_the_beginning_of_those_of_the_run(reading: httpx2.Client, unfinished: str) -> None:
@@ -72,7 +73,11 @@ def test_its_series_are_the_beginning_of_those_of_the_run(reading: httpx2.Client
 
 
 def test_another_one_is_not_found(reading: httpx2.Client) -> None:
-    for address in (f"/unfinished-runs/{'0' * 32}", f"/unfinished-runs/{'0' * 32}/series"):
+    for address in (
+        f"/unfinished-runs/{'0' * 32}",
+        f"/unfinished-runs/{'0' * 32}/series",
+        f"/unfinished-runs/{'0' * 32}/units",
+    ):
         assert reading.get(address).status_code == 404
 
 

@@ -128,7 +128,10 @@ def test_points_in_a_unit(tmp_path: Path) -> None:
             ("bean.csv", "--scene=vesicle-shear", "--shift", "0", "nan"),
             "--shift: 0 nan — must be from",
         ),
-        (("bean.csv", "--scene=vesicle-shear", "--unit=um"), "--unit: 'um' — a unit needs the table units"),
+        (
+            ("bean.csv", "--scene=vesicle-shear", "--unit=um"),
+            "--unit: 'um' — a unit needs those of the scene",
+        ),
         (("bean.csv", "--scene=vesicle-shear", "--time=3"), "--time — is one of a stored run"),
         (
             ("bean.csv", "--scene=critical-hamaker"),

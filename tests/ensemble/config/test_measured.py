@@ -125,7 +125,8 @@ def test_limits_of_another_dimension_are_refused() -> None:
 
 def test_a_unit_needs_the_units_of_the_scene() -> None:
     with pytest.raises(
-        ValueError, match=r"flow\.rate: '0\.5 1/s' — a unit needs the table units of the scene"
+        ValueError,
+        match=r"flow\.rate: '0\.5 1/s' — a unit needs those of the scene: units\.radius .* units\.viscosity",
     ):
         load_scene("doublet-shear", ["flow.rate=0.5 1/s"])
     assert load_scene("doublet-shear", ["vesicles.0.angle=90 deg"]) == load_scene("doublet-shear")

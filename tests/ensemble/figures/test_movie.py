@@ -68,13 +68,15 @@ def test_the_pictures_of_a_file_show_the_membranes_where_they_are(
     monkeypatch.setattr(movie, "_DURATION", (0.4, 20.0))
     monkeypatch.setattr(movie, "_HOLD", 0.1)
     run, path = few_frames(orbit()), tmp_path / f"run{suffix}"
-    save_movie(run, path)
+    counted: list[tuple[int, int]] = []
+    save_movie(run, path, lambda drawn, total: counted.append((drawn, total)))
+    assert counted == [(drawn, len(counted)) for drawn in range(1, len(counted) + 1)]
     assert list(tmp_path.iterdir()) == [path]
     assert duration(path) == pytest.approx(0.4 + 0.1, abs=0.2)
     pictures = list(decoded(path))
     assert pictures[0].shape == (*size, 3)
 
-    picture = Picture(run, size[0] / 4.5)
+    picture = Picture(run, size[0] / 3.0)
     for shown, time in ((pictures[0], 0.0), (pictures[-1], 4.0)):
         picture.show(time)
         on_membranes = np.array(picture.membranes.get_segments())[:, 0]

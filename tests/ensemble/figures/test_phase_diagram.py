@@ -55,10 +55,17 @@ EXTENSION_RATE = r"extension rate, $\dot{\epsilon}$"
 UNITS = Units(radius="10 um", bending_modulus="1e-19 J", viscosity="1 mPa*s")
 
 
-def test_axes_say_what_their_units_are_if_they_are_known() -> None:
-    axes = phase_diagram(boundary([point(1.0, 0.7)]).in_units(UNITS), []).axes[0]
-    assert axes.get_xlabel() == f"{SHEAR_RATE} (0.1 1/s)"
-    assert axes.get_ylabel().endswith(" (100 µPa)")
+def test_axes_have_the_units_of_the_scene_if_they_are_known() -> None:
+    traced = boundary([point(1.0, 0.7), point(2.0, 1.4), point(3.0, 2.1)]).in_units(UNITS)
+    axes = phase_diagram(traced, [(1.0, 0.7, Outcome.BOUND)]).axes[0]
+    assert axes.get_xlabel() == f"{SHEAR_RATE} (1/s)"
+    assert axes.get_ylabel().endswith(" (µPa)")
+    for gid in ("run bound", "boundary", "fit"):
+        drawn = artist(axes, gid)
+        assert (drawn.get_xdata()[0], drawn.get_ydata()[0]) == pytest.approx((0.1, 70.0))
+    assert "700 " in artist(axes, "fit").get_label()
+    ends = artist(axes, "bracket").get_segments()[0][:, 1]
+    assert ends == pytest.approx([70 / 1.25, 70 * 1.25])
     assert r"$\delta$ = 0.4 (4 µm)" in axes.get_title()
 
 

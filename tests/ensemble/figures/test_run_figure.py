@@ -13,6 +13,7 @@ from ensemble.figures import run_figure
 from ensemble.figures.style import TENSION_COLORS
 from solver.analysis.run import Frames, Outcome, Run
 from solver.membrane.curve import positions
+from solver.scene import Units
 from tests.ensemble.made_runs import (
     ALPHA,
     known_tension,
@@ -25,6 +26,24 @@ from tests.ensemble.made_runs import (
 )
 
 VISCOSITY = "viscosity_bending_tension"
+
+
+def test_a_run_with_units_is_drawn_in_them() -> None:
+    run = orbit()
+    units = Units(radius="10 um", bending_modulus="1e-19 J", viscosity="1 mPa*s")
+    figure = run_figure(replace(run, scene=run.scene.model_copy(update={"units": units})))
+    gap = panel(figure, "gap")
+    np.testing.assert_allclose(
+        gap.lines[0].get_xydata(), 10 * np.transpose([run.series["time"], run.series["gap"]])
+    )
+    assert gap.get_ylabel() == "gap (µm)"
+    lines, axes = snapshots(figure)
+    assert axes.texts[-1].get_text() == "$t$ = 400 s"
+    plain = snapshots(run_figure(run))[0].get_array()
+    np.testing.assert_allclose(lines.get_array(), plain)  # one is 1 nN/m
+    assert panel(figure, "tension").get_xlabel() == r"tension $\sigma$ (nN/m)"
+    heading = figure.get_suptitle()
+    assert f"$t$ = {run.time:.4g} ({10 * run.time:.4g} s)" in heading
 
 
 def test_snapshots_are_spread_over_the_whole_run() -> None:

@@ -130,7 +130,7 @@ def test_another_rate_changes_the_answer_as_its_sensitivity_says():
         ),
         (("--error=flow.rate=1.5",), "error: flow.rate=1.5 — must be a fraction"),
         (("--error=flow.rat=0.1",), "did you mean 'flow.rate'?"),
-        (("--error=units.radius=0.1",), "error: units.radius — the scene has no table units"),
+        (("--error=units.radius=0.1",), "error: units.radius — the scene has no units, such as units.radius"),
         (("--error=flow.rate=much",), "error: flow.rate='much' — must be a number"),
     ],
 )

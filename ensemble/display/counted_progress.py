@@ -1,4 +1,4 @@
-"""Shows on standard error how far the verification of a store has come."""
+"""Shows on standard error how many of a number of things are done: runs verified, pictures drawn."""
 
 from __future__ import annotations
 
@@ -11,33 +11,39 @@ from rich.progress import Progress
 
 from ensemble.display.progress_line import ProgressLine
 
+VERIFIED = "runs verified"
 SECONDS = 0.5  # between two lines for a program
 SECONDS_IN_A_LOG = 10.0
 
 
 @contextmanager
-def check_progress(console: Console) -> Iterator[Callable[[int, int], None]]:
+def counted_progress(console: Console, doing: str, done: str) -> Iterator[Callable[[int, int], None]]:
     """Give a function that shows a bar on a terminal, and plain lines elsewhere.
 
     Parameters
     ----------
     console : Console
         Where it is shown.
+    doing : str
+        What the bar is called, such as ``verifying runs``.
+    done : str
+        What is counted, such as ``runs verified``.
 
     Yields
     ------
     callable
-        Takes the number of runs that are verified and the number of all.
+        Takes the number of those that are done and the number of all.
     """
+
+    def print_line(count: int, total: int) -> None:
+        console.print(f"{count} of {total} {done}", soft_wrap=True, highlight=False)
+
     if console.is_terminal:
         with Progress(console=console, transient=True) as progress:
-            bar = progress.add_task("verifying runs")
-            yield lambda verified, total: progress.update(bar, completed=verified, total=total)
+            bar = progress.add_task(doing, visible=False)  # until there is something to count
+            yield lambda count, total: progress.update(bar, completed=count, total=total, visible=True)
     else:
-        yield _now_and_then(
-            lambda verified, total: console.print(_text(verified, total), soft_wrap=True, highlight=False),
-            SECONDS_IN_A_LOG,
-        )
+        yield _now_and_then(print_line, SECONDS_IN_A_LOG)
 
 
 @contextmanager
@@ -57,14 +63,10 @@ def check_lines(console: Console) -> Iterator[Callable[[int, int], None]]:
 
     def show(verified: int, total: int) -> None:
         fraction = min(verified / max(total, 1), 1.0)
-        message = _text(verified, total)
+        message = f"{verified} of {total} {VERIFIED}"
         ProgressLine(fraction=fraction, message=message, reached=verified).print_on(console)
 
     yield _now_and_then(show, SECONDS)
-
-
-def _text(verified: int, total: int) -> str:
-    return f"{verified} of {total} runs verified"
 
 
 def _now_and_then(show: Callable[[int, int], None], seconds: float) -> Callable[[int, int], None]:
