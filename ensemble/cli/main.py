@@ -16,7 +16,6 @@ from typing import Annotated
 import typer
 
 from ensemble.cli import (
-    measure_command,
     preset_command,
     question_commands,
     report_commands,
@@ -39,7 +38,6 @@ app = typer.Typer(
 for _command in (
     *question_commands.COMMANDS,
     steady_commands.steady,
-    measure_command.measure_adhesion,
     *store_commands.COMMANDS,
     report_commands.report,
     preset_command.presets,

@@ -75,7 +75,25 @@ def run(  # numpydoc ignore=PR01
     answer_and_print("scene", scene, changes, place, ranks_per_run, progress, as_json)
 
 
-COMMANDS = (bisect, run)
+def measure_adhesion(  # numpydoc ignore=PR01
+    measurement: Document = "adhesion-measurement",
+    changes: Changes = [],  # noqa: B006
+    store: StorePath = DEFAULT_STORE,
+    no_store: NoStore = False,
+    progress: ProgressAs = ProgressFormat.TEXT,
+    as_json: AsJson = False,
+) -> None:
+    """Find how strong an adhesion is, from the extension rate at which a fluid trap ends side by side.
+
+    The document has the pair in a trap, with scene.flow.rate the critical rate that was measured as the rate
+    rose slowly, and the relative standard errors of the inputs.  The error of the answer is that of the
+    inputs, propagated, and of the numerics.  The exit status is 4 if there is no answer.
+    """
+    place = None if no_store else store
+    answer_and_print("measurement", measurement, changes, place, None, progress, as_json)
+
+
+COMMANDS = (bisect, run, measure_adhesion)
 
 
 def draw_map(  # numpydoc ignore=PR01

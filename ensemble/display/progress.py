@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from datetime import timedelta
+from itertools import count
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console, Group
@@ -177,6 +178,31 @@ def run_progress(console: Console) -> Iterator[Callable[[float, float], None]]:
     with Progress(console=console, transient=True) as progress, told_above(console):
         bar = progress.add_task("simulating")
         yield lambda time, end: progress.update(bar, completed=time, total=end)
+
+
+@contextmanager
+def step_lines(console: Console, steps: int) -> Iterator[Callable[[str], None]]:
+    """Give a function that prints a `ProgressLine` at the beginning of each step of an answer.
+
+    Parameters
+    ----------
+    console : Console
+        Where it is printed.
+    steps : int
+        How many there are.
+
+    Yields
+    ------
+    callable
+        Takes what is done next.
+    """
+    begun = count()
+
+    def show(step: str) -> None:
+        done = next(begun)
+        ProgressLine(fraction=min(done / steps, 1.0), message=step, reached=done).print_on(console)
+
+    yield show
 
 
 def progress_text(progress: JobProgress[Any]) -> str:

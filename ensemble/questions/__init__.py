@@ -1,4 +1,4 @@
-"""Questions that the package answers, one module for each kind: a study, a map, a single scene.
+"""Questions that the package answers, one module for each kind: a study, a map, a measurement, a scene.
 
 The command line and the service know of a kind only what `Question` states.  To add a kind:
 
@@ -45,6 +45,7 @@ GROUP: Final = "ensemble.questions"
 KINDS: Final = (
     EntryPoint("study", "ensemble.questions.study_question:StudyQuestion", GROUP),
     EntryPoint("map", "ensemble.questions.map_question:MapQuestion", GROUP),
+    EntryPoint("measurement", "ensemble.questions.measurement_question:MeasurementQuestion", GROUP),
     EntryPoint("scene", "ensemble.questions.scene_question:SceneQuestion", GROUP),
 )
 

@@ -9,9 +9,11 @@ from __future__ import annotations
 import time
 from typing import Any
 
+from ensemble.config.adhesion_measurement import AdhesionMeasurement, InputErrors
 from ensemble.config.documents import load_scene
-from ensemble.questions.adhesion_measurement import AdhesionMeasurement
 from ensemble.questions.branches import BranchQuestion
+from ensemble.questions.measurement_question import measure
+from solver.scene import Scene
 
 STRENGTHS = (0.4, 0.7, 1.2)
 AREAS = (0.7, 0.8, 0.9)
@@ -26,10 +28,16 @@ def critical_rate(hamaker: float, reduced_area: float) -> float:
     return float(document["folds"][0]["value"])
 
 
-def measured(rate: float, reduced_area: float, errors: dict[str, float]) -> dict[str, Any]:
+def answer_about(scene: Scene, **errors: float) -> dict[str, Any]:
+    """Measure the adhesion of the pair in a scene."""
+    measurement = AdhesionMeasurement(name="trap", errors=InputErrors(**errors), scene=scene)
+    return measure(measurement, None, lambda step: None).json_document()
+
+
+def measured(rate: float, reduced_area: float) -> dict[str, Any]:
     """Measure the adhesion from a critical rate."""
     changes = [f"flow.rate={rate!r}", f"vesicles.reduced_area={reduced_area}"]
-    return AdhesionMeasurement(load_scene("doublet-trap", changes), errors).answer(None).json_document()
+    return answer_about(load_scene("doublet-trap", changes))
 
 
 def main() -> None:
@@ -38,7 +46,7 @@ def main() -> None:
         for hamaker in STRENGTHS:
             rate = critical_rate(hamaker, reduced_area)
             began = time.process_time()
-            found = measured(rate, reduced_area, {})
+            found = measured(rate, reduced_area)
             seconds = time.process_time() - began
             print(
                 f"| {hamaker} | {reduced_area} | {rate:.8f} | {found['hamaker']:.8f} "

@@ -34,13 +34,15 @@ def test_every_preset_is_of_one_kind() -> None:
 )
 def test_a_document_of_no_kind_or_of_two_is_refused(document: dict[str, Any]) -> None:
     with pytest.raises(
-        ValueError, match=r"exactly one of the keys 'search' \(study\), 'axes' \(map\), 'horizon' \(scene\)"
+        ValueError, match=r"exactly one of the keys 'search' \(study\), 'axes' \(map\), 'errors' \(meas"
     ):
         kind_of(document)
 
 
 def test_what_is_no_kind_is_refused() -> None:
-    with pytest.raises(ValueError, match="'novel' is no kind of question; kinds: study, map, scene"):
+    with pytest.raises(
+        ValueError, match="'novel' is no kind of question; kinds: study, map, measurement, scene"
+    ):
         kind_named("novel")
     with pytest.raises(ValueError, match="Numerics"):
         kind_of_model(Numerics())

@@ -4,32 +4,34 @@ from __future__ import annotations
 
 import math
 import time as clock
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple, Self
 
+from ensemble.config.adhesion_measurement import INPUTS, AdhesionMeasurement
 from ensemble.config.dotted_paths import parameter_value
 from ensemble.config.measured import Measured, measured_document, measured_values
 from ensemble.config.overrides import override
-from ensemble.config.validation import nearest, validated
+from ensemble.config.validation import validated
 from ensemble.questions.branches import NoAnswer, opened, run_of
-from ensemble.questions.question import Answer
+from ensemble.questions.question import Answer, Question
+from ensemble.questions.size_limits import MOST_VESICLES_SWEPT, limit_vesicles
 from solver.dimensions import ADHESION_ENERGY, HAMAKER, RATE, TIME
 from solver.scene import Scene
 
 if TYPE_CHECKING:
+    from mpi4py.MPI import Intracomm
+    from rich.console import Console
     from rich.table import Table
 
+    from ensemble.display.progress import Display
     from ensemble.store import Store
-    from solver.scene import PairPotential
     from solver.simulation.steady_scenes import Shapes, SteadyBranch, SteadyPoint
 
-_HAMAKER, _RATE, _AREA = "adhesion.hamaker", "flow.rate", "vesicles.reduced_area"
-_DISTANCE = "adhesion.distance"
-_RADIUS, _MODULUS, _VISCOSITY = "units.radius", "units.bending_modulus", "units.viscosity"
-INPUTS: Final = (_RATE, _AREA, _DISTANCE, _RADIUS, _MODULUS, _VISCOSITY)
+_HAMAKER: Final = "adhesion.hamaker"
+_RATE, _AREA, _DISTANCE = (INPUTS[name] for name in ("rate", "reduced_area", "distance"))
 NUMERICS: Final = "numerics"  # what the points and the search leave, beside the inputs
 
 # Where the pair is looked for first: at the fold of the preset at reduced area 0.8, and with more adhesion.
@@ -42,99 +44,187 @@ _NEAR = 0.01  # relative distance from the critical strength of the state from w
 _FINER = 1.5  # times the points
 _FOUND = 1e-8  # relative accuracy with which the end of a branch is found
 _STEPS = (0.005, 0.2)  # of a plan, relative, at least and at most
+_STEPS_OF_ANSWER = 6  # that are told
 _DECAY = 3.0  # time constants of the slowest perturbation for which a rate is held
 
 
-@dataclass(frozen=True)
-class AdhesionMeasurement:
-    """How strong the adhesion of a pair is that a slowly rising extension rate has turned from side by side.
+class MeasurementQuestion(Question[AdhesionMeasurement]):
+    """The question how strong the adhesion of a pair is that a rising rate has turned, see `Question`.
 
     Attributes
     ----------
-    scene : Scene
-        A pair in a trap at the critical rate that was measured.  Its Hamaker constant is not used.
-    errors : mapping of str to float
-        Relative standard errors of inputs by their dotted paths in the scene, which are in `INPUTS`.
+    document : AdhesionMeasurement
+        What is asked.
+    name : str
+        The name of the measurement.
     """
 
-    scene: Scene
-    errors: Mapping[str, float]
+    kind = "measurement"
+    document_type = AdhesionMeasurement
+    marker = "errors"
+    command = "measure-adhesion"
+    title = "Measure an adhesion"
+    answer_title = "measurement"
+    has_many_runs = False
+    principal_fields = tuple(f"errors.{name}" for name in INPUTS)
 
-    def __post_init__(self) -> None:
-        flow = self.scene.imposed_flow
-        if flow is None or not flow.strains or flow.comoving or len(self.scene.vesicles) != 2:
-            raise ValueError("flow: a measurement takes a pair in a trap, at the critical rate")
-        if self.scene.protocol is not None:
-            raise ValueError("protocol: a measurement takes one rate, the critical one; leave it out")
-        if self.adhesion.cutoff is not None:
-            raise ValueError("adhesion.cutoff: a measurement takes a potential without it")
-        parameter_value(self.scene, _AREA)
-        for path, error in self.errors.items():
-            if path not in INPUTS:
-                similar = nearest(path, INPUTS)
-                hint = f"did you mean {similar!r}?" if similar else f"inputs: {', '.join(INPUTS)}"
-                raise ValueError(f"error: {path!r} is no input of the measurement; {hint}")
-            if path.startswith("units.") and self.scene.units is None:
-                raise ValueError(f"error: {path} — the scene has no units, such as units.radius")
-            if not 0 <= error < 1:
-                raise ValueError(f"error: {path}={error:g} — must be a fraction, at least 0 and less than 1")
+    @classmethod
+    def check_size(cls, document: Any) -> None:
+        """See `Question`.
 
-    @property
-    def adhesion(self) -> PairPotential:
-        """The potential, with a strength that is not used."""
-        if self.scene.adhesion is None:
-            raise ValueError("adhesion: a measurement needs the potential's distance")
-        return self.scene.adhesion
+        Parameters
+        ----------
+        document : object
+            What was sent.
+        """
+        limit_vesicles(document, MOST_VESICLES_SWEPT, "scene")
 
-    def answer(self, path: Path | None) -> Answer:
+    def planned_runs(self) -> list[tuple[Scene, int]]:
+        """See `Question`.
+
+        Returns
+        -------
+        list of (Scene, int)
+            The run that is the first of the steady states, with more and more adhesion.
+        """
+        return [(self.document.scene, _MOST_TRIALS)]
+
+    def answer(
+        self,
+        communicator: Intracomm | None,
+        store: Path | None,
+        ranks_per_run: int,
+        on_change: Callable[..., None],
+    ) -> Answer | None:
         """Follow the pair that rests side by side as its adhesion weakens, to where it is lost.
 
         Parameters
         ----------
-        path : Path or None
+        communicator : Intracomm or None
+            Of several ranks the first one answers alone.
+        store : Path or None
             Directory of the store that keeps the runs and the branch.
+        ranks_per_run : int
+            Not used.
+        on_change : callable
+            Takes what is done next.
 
         Returns
         -------
-        Answer
+        Answer or None
+            On the first rank.
         """
-        from ensemble.search.branch_summary import branch_key
-        from ensemble.store.branch_record import summary_of
-        from solver.steady_states.newton import NoSteadyStateError
+        if communicator is not None and communicator.Get_rank() > 0:
+            return None
+        return measure(self.document, store, on_change)
 
-        began = clock.perf_counter()
-        with opened(path) as store:
-            start = self._side_by_side(store)
-            if isinstance(start, str):
-                return NoAnswer(start)
-            scene, near = start
-            weakest = _WEAKEST * parameter_value(scene, _HAMAKER)
-            try:
-                branch = _weakened(scene, near, weakest)
-                loss = _Loss.of(branch)
-                dependence = loss.dependence()
-            except NoSteadyStateError as error:
-                return NoAnswer(str(error))
-            key = branch_key(scene, _HAMAKER, weakest)
-            if store is not None and not store.branches.contains(key):
-                store.save_branch(summary_of(scene, _HAMAKER, weakest, branch), branch)
-        return _MeasuredAdhesion(self, loss, dependence, key, clock.perf_counter() - began)
+    @classmethod
+    def progress(cls, console: Console, for_program: bool) -> Display:
+        """See `Question`.
 
-    def _side_by_side(self, store: Store | None) -> tuple[Scene, Shapes] | str:
-        """Return a scene with more adhesion and its pair at rest side by side, or why there is none."""
-        from solver.analysis.run import Outcome
-        from solver.simulation.steady_scenes import Shapes
+        Parameters
+        ----------
+        console : Console
+        for_program : bool
 
-        strength = _ABOVE * _KNOWN_FOLD * parameter_value(self.scene, _RATE) / self.adhesion.distance
-        for _ in range(_MOST_TRIALS):
-            scene = _changed(self.scene, {_HAMAKER: strength})
-            run = run_of(scene, store)
-            if run.outcome is Outcome.FAILED:
-                return f"with H = {strength:.4g} the run fails: {run.failure}"
-            if run.outcome is Outcome.BOUND:
-                return scene, Shapes(run.frames.tangent_angle[-1], run.frames.center[-1])
-            strength *= 2
-        return f"no adhesion up to H = {strength / 2:.4g} holds the pair side by side at this rate"
+        Returns
+        -------
+        context manager
+            Gives a function that takes what is done next.
+        """
+        from ensemble.display.progress import report_progress, step_lines
+
+        return step_lines(console, _STEPS_OF_ANSWER) if for_program else report_progress(console)
+
+    @classmethod
+    def summary(cls, json_document: Mapping[str, Any]) -> str:
+        """See `Question`.
+
+        Parameters
+        ----------
+        json_document : mapping
+            As `ensemble measure-adhesion --json` prints it.
+
+        Returns
+        -------
+        str
+            Strength and energy with their errors, which input leaves most of these, and where to look.
+        """
+        if json_document["failure"] is not None:
+            return str(json_document["failure"])
+        measured = json_document.get("in_units", {})
+
+        def text(name: str) -> str:
+            each = measured.get(name, {"value": json_document.get(name), "unit": ""})
+            if name.startswith("plan.") and name not in measured:
+                each = {"value": json_document["plan"][name.removeprefix("plan.")], "unit": ""}
+            return f"{each['value']:.4g} {each['unit']}".rstrip()
+
+        return (
+            f"H = {text('hamaker')} ± {text('hamaker_error')}, "
+            f"energy per area {text('adhesion_energy')} ± {text('adhesion_energy_error')}; "
+            f"most of the error comes from {json_document['dominant']}; "
+            f"look at rates from {text('plan.from')} to {text('plan.to')} in steps of {text('plan.step')}, "
+            f"and hold each for {text('plan.hold')}"
+        )
+
+
+def measure(measurement: AdhesionMeasurement, path: Path | None, on_step: Callable[[str], None]) -> Answer:
+    """Follow the pair that rests side by side as its adhesion weakens, to where it is lost.
+
+    Parameters
+    ----------
+    measurement : AdhesionMeasurement
+    path : Path or None
+        Directory of the store that keeps the runs and the branch.
+    on_step : callable
+        Takes what is done next.
+
+    Returns
+    -------
+    Answer
+    """
+    from ensemble.search.branch_summary import branch_key
+    from ensemble.store.branch_record import summary_of
+    from solver.steady_states.newton import NoSteadyStateError
+
+    began = clock.perf_counter()
+    with opened(path) as store:
+        on_step("looking for the pair that rests side by side")
+        start = _side_by_side(measurement, store)
+        if isinstance(start, str):
+            return NoAnswer(start)
+        scene, near = start
+        weakest = _WEAKEST * parameter_value(scene, _HAMAKER)
+        try:
+            on_step("following it as its adhesion weakens")
+            branch = _weakened(scene, near, weakest)
+            loss = _Loss.of(branch)
+            dependence = loss.dependence(on_step)
+        except NoSteadyStateError as error:
+            return NoAnswer(str(error))
+        key = branch_key(scene, _HAMAKER, weakest)
+        if store is not None and not store.branches.contains(key):
+            store.save_branch(summary_of(scene, _HAMAKER, weakest, branch), branch)
+    return _MeasuredAdhesion(measurement, loss, dependence, key, clock.perf_counter() - began)
+
+
+def _side_by_side(measurement: AdhesionMeasurement, store: Store | None) -> tuple[Scene, Shapes] | str:
+    """Return a scene with more adhesion and its pair at rest side by side, or why there is none."""
+    from solver.analysis.run import Outcome
+    from solver.simulation.steady_scenes import Shapes
+
+    rate = parameter_value(measurement.scene, _RATE)
+    strength = _ABOVE * _KNOWN_FOLD * rate / measurement.adhesion.distance
+    for _ in range(_MOST_TRIALS):
+        scene = _changed(measurement.scene, {_HAMAKER: strength})
+        run = run_of(scene, store)
+        if run.outcome is Outcome.FAILED:
+            return f"with H = {strength:.4g} the run fails: {run.failure}"
+        if run.outcome is Outcome.BOUND:
+            return scene, Shapes(run.frames.tangent_angle[-1], run.frames.center[-1])
+        strength *= 2
+    return f"no adhesion up to H = {strength / 2:.4g} holds the pair side by side at this rate"
 
 
 class _Dependence(NamedTuple):
@@ -167,12 +257,12 @@ class _Dependence(NamedTuple):
     def _with_units(self, distance: float, power: int) -> dict[str, float]:
         # Of κ/R^power f(rate μR³/κ, area, δ/R), where f has these derivatives.
         return {
-            _RATE: self.rate,
-            _AREA: self.area,
-            _DISTANCE: distance,
-            _RADIUS: 3 * self.rate - distance - power,
-            _MODULUS: 1 - self.rate,
-            _VISCOSITY: self.rate,
+            "rate": self.rate,
+            "reduced_area": self.area,
+            "distance": distance,
+            "radius": 3 * self.rate - distance - power,
+            "bending_modulus": 1 - self.rate,
+            "viscosity": self.rate,
         }
 
 
@@ -204,7 +294,7 @@ class _Loss(NamedTuple):
         enough = [each for each in branch.points if each.parameter > (1 + _NEAR) * point.parameter]
         return cls(kind, point, enough[-1] if enough else branch.points[0])
 
-    def dependence(self) -> _Dependence:
+    def dependence(self, on_step: Callable[[str], None]) -> _Dependence:
         """Find the loss again with changed inputs and with more points."""
         from solver.membrane.resampling import resampled_angle
         from solver.simulation.steady_scenes import Shapes
@@ -215,6 +305,7 @@ class _Loss(NamedTuple):
 
         def change(path: str, value: float, near: Shapes = shapes) -> float:
             """Return the relative change of the critical strength, as a logarithm."""
+            on_step(f"finding how the answer depends on {path}")
             branch = _weakened(_changed(scene, {path: value}), near, strength / 2)
             return math.log(_Loss.of(branch).point.parameter / self.point.parameter)
 
@@ -272,8 +363,8 @@ class _MeasuredAdhesion(Answer):
     @cached_property
     def _contributions(self) -> dict[str, float]:
         """The relative errors of the energy that each input leaves, and the numerics."""
-        slopes, errors = self.dependence.of_energy(), self.measurement.errors
-        inputs = {path: abs(slopes[path]) * errors[path] for path in INPUTS if path in errors}
+        slopes, errors = self.dependence.of_energy(), self.measurement.relative_errors
+        inputs = {name: abs(slopes[name]) * error for name, error in errors.items()}
         return inputs | {NUMERICS: self.dependence.numerics}
 
     def _plan(self) -> dict[str, float]:
@@ -283,9 +374,9 @@ class _MeasuredAdhesion(Answer):
         """
         scene = self.measurement.scene
         rate, slope = parameter_value(scene, _RATE), abs(self.dependence.rate)
-        others = math.hypot(*(self._contributions[path] for path in self._contributions if path != _RATE))
+        others = math.hypot(*(error for name, error in self._contributions.items() if name != "rate"))
         step = min(max(math.sqrt(12) * others / slope, _STEPS[0]), _STEPS[1])
-        reach = max(3 * self.measurement.errors.get(_RATE, 0.0), 2 * step)
+        reach = max(3 * self.measurement.errors.rate, 2 * step)
         growth = self.loss.shortly_before.state.eigenvalues[0].real
         return {
             "from": rate * max(1 - reach, 0.0),
@@ -301,10 +392,10 @@ class _MeasuredAdhesion(Answer):
         assert state.scene.adhesion is not None
         hamaker = self.loss.point.parameter
         energy = hamaker * state.scene.adhesion.flat_membranes.energy
-        contributions, errors = self._contributions, self.measurement.errors
+        contributions, errors = self._contributions, self.measurement.relative_errors
         slopes = self.dependence.of_hamaker()
         of_hamaker = math.hypot(
-            *(slopes[path] * error for path, error in errors.items()), self.dependence.numerics
+            *(slopes[name] * error for name, error in errors.items()), self.dependence.numerics
         )
         return {
             "failure": None,
@@ -348,7 +439,5 @@ class _MeasuredAdhesion(Answer):
 
     @property
     def footer(self) -> str:
-        return (
-            "critical is the rate at which a pair that rests side by side is lost as the rate rises slowly; "
-            f"most of the error comes from {self._fields['dominant']}"
-        )
+        found = MeasurementQuestion.summary(self.json_document())
+        return f"{found}; the steady states behind it: ensemble show {self.branch_key}"
