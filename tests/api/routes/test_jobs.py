@@ -95,7 +95,7 @@ def test_a_scene_with_units_makes_the_same_job(submitting, queue):
         ({"preset": "doublet-shear", "set": {"flow.rate": [1]}}, "flow.rate"),
         ({"scene": {"horizon": "100", "vesicles": [{}]}}, "scene.horizon"),
         ({"scene": {"units": UNITS, "horizon": "3 m", "vesicles": [{}]}}, "such as '0.5 s'"),
-        ({"scene": {"horizon": "3 s", "vesicles": [{}]}}, "scene.horizon: '3 s' — a unit needs the table"),
+        ({"scene": {"horizon": "3 s", "vesicles": [{}]}}, "scene.horizon: '3 s' — a unit needs those of"),
         ({"scene": {"horizon": 100, "vesicles": [{}, {}]}}, "vesicles 0 and 1 overlap"),
         ({"preset": "doublet-shear", "ranks": 0}, "ranks"),
         ({"preset": "doublet-shear", "ranks": 1.5}, "ranks"),
