@@ -292,10 +292,10 @@ def _leaves(document: Mapping[str, Any], prefix: str = "") -> list[tuple[str, An
 
 
 def _number(value: Any) -> str:
-    if value is None or value == []:
+    if value is None:
         return _ABSENT
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, list):
-        return ", ".join(map(_number, value))
+        return ", ".join(map(_number, value)) or _ABSENT
     return f"{value:.6g}" if isinstance(value, float) else str(value)

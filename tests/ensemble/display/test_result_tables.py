@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from io import StringIO
 
+import numpy as np
 from rich.console import Console, RenderableType
 from rich.table import Table
 
@@ -60,6 +61,7 @@ def test_fields_of_inner_tables_have_a_row_each_and_words_of_no_language() -> No
         "settled": True,
         "perturbations": [],
         "gap": None,
+        "time": np.float64(2),
     }
     cells = dict(zip(*(column.cells for column in fields_table(document).columns), strict=True))
     assert cells == {
@@ -68,6 +70,7 @@ def test_fields_of_inner_tables_have_a_row_each_and_words_of_no_language() -> No
         "settled": "yes",
         "perturbations": "–",
         "gap": "–",
+        "time": "2",
     }
 
 
