@@ -60,6 +60,12 @@ const LABELS = /** @type {Record<string, string>} */ ({
   "search.scan": "values scanned in a decade",
   "search.tolerance": "relative width of a bracket",
   "search.certify": "certify the brackets",
+  "errors.rate": "error of the critical rate",
+  "errors.reduced_area": "error of the reduced area",
+  "errors.distance": "error of the adhesion distance",
+  "errors.radius": "error of the radius",
+  "errors.bending_modulus": "error of the bending modulus",
+  "errors.viscosity": "error of the viscosity",
 });
 
 /** The document of a form, and what the service says about its fields. */

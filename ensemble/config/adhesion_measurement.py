@@ -34,15 +34,17 @@ class InputErrors(Model):
     Attributes
     ----------
     rate : float
-        Of the critical rate.
+        Relative standard error of the critical rate: 0.05 are five percent.
     reduced_area : float
+        Relative standard error of the reduced area.
     distance : float
-        Of the distance of the potential.
+        Relative standard error of the distance of the potential.
     radius : float
-        Of the unit of length.
+        Relative standard error of the unit of length.
     bending_modulus : float
+        Relative standard error of the bending modulus.
     viscosity : float
-        Of the fluid outside.
+        Relative standard error of the viscosity outside.
     """
 
     rate: Fraction = 0.0
