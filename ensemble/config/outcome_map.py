@@ -54,6 +54,12 @@ class Axis(Model):
             raise ValueError("limits: the first must be less than the second")
         if self.spacing == "geometric" and first <= 0:
             raise ValueError("limits: must be above 0 with the spacing geometric")
+        ends_and_middles = (*self.edges, *self.values)
+        if len(set(ends_and_middles)) < len(ends_and_middles):
+            raise ValueError(
+                f"limits: must be farther apart than {first!r} and {last!r}: the values of {self.cells} "
+                f"cells have {_DIGITS} digits, and some would be equal"
+            )
         return self
 
     @property
@@ -118,7 +124,12 @@ class OutcomeMap(Model):
             raise ValueError("axes.1.parameter: must differ from axes.0.parameter")
         columns, rows = self.shape
         for cell in product((0, columns - 1), (0, rows - 1)):
-            self.scene_at(cell)
+            try:
+                self.scene_at(cell)
+            except ValueError as error:
+                at = zip(self.axes, cell, strict=True)
+                values = ", ".join(f"{axis.parameter}={axis.values[index]!r}" for axis, index in at)
+                raise ValueError(f"axes: {values} — {error}") from None
         return self
 
     @cached_property

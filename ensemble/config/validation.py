@@ -19,7 +19,7 @@ Validated = TypeVar("Validated")
 SomeModel = TypeVar("SomeModel", bound=BaseModel)
 
 # What pydantic says in words of Python.
-_WORDS = {"tuple_type": "must be a list, such as [0.5, 1.0]"}
+_WORDS = {"tuple_type": "must be a list"}
 
 
 @overload

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from ensemble.config.outcome_map import OutcomeMap
 from ensemble.config.run_key import run_key
-from ensemble.search.map_record import MapRecord, MapRunRecord
+from ensemble.search.map_record import NO_SCENE, MapRecord, MapRunRecord
 from ensemble.search.map_refinement import Cell, MapRefinement
 from ensemble.search.task_queue import RunAnswer, Task
 from ensemble.timestamp import now
@@ -122,6 +122,9 @@ class MapPlanner:
         while not (self._waiting or self._running or self._refinement.done):
             for cell in sorted(self._refinement.wave, reverse=True):
                 task = self._task(cell)
+                if task is None:
+                    self._label(cell, NO_SCENE)
+                    continue
                 answer = self._known(task.key)
                 if answer is None:
                     self._waiting.append(task)
@@ -129,11 +132,17 @@ class MapPlanner:
                     self.known_answers += 1
                     self._tell(task, answer)
 
-    def _task(self, cell: Cell) -> MapRun:
-        scene = self._map.scene_at(cell)
+    def _task(self, cell: Cell) -> MapRun | None:
+        """Return the run of a cell; None if there is no such scene, which only looking at it can tell."""
+        try:
+            scene = self._map.scene_at(cell)
+        except ValueError:
+            return None
         return MapRun(scene=scene, key=run_key(scene), cell=cell)
 
     def _tell(self, task: MapRun, answer: RunAnswer) -> None:
         self._keys[task.cell] = task.key
-        label = label_of(self._map.label, answer)
-        self._refinement.tell(task.cell, self._numbers.setdefault(label, len(self._numbers)))
+        self._label(task.cell, label_of(self._map.label, answer))
+
+    def _label(self, cell: Cell, label: str) -> None:
+        self._refinement.tell(cell, self._numbers.setdefault(label, len(self._numbers)))

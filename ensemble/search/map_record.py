@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import Any, Self
+from typing import Any, Final, Self
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict
@@ -12,6 +12,9 @@ from ensemble.config.outcome_map import OutcomeMap
 from ensemble.search.map_refinement import Labels, beside_changes
 from ensemble.timestamp import Timestamp
 from solver.scene import Scene, Units
+
+# Label of cells where the scene does not allow the values, such as where vesicles would overlap.
+NO_SCENE: Final = "no-scene"
 
 
 class MapRunRecord(BaseModel):
@@ -43,11 +46,11 @@ class MapRecord(BaseModel):
     map : dict
         The question in full.
     labels : list of str
-        The labels that cells have.
+        The labels that cells have; ``no-scene`` where the scene does not allow the values.
     cells : list of list of int
         For each value along the first axis, and each along the second one, the number of the cell's label.
     runs : list of MapRunRecord
-        The cells that were run; all others have the label of all cells beside them.
+        The cells that were run; of the others, those with a scene have the label of the cells around them.
     updated : datetime
         When it was done.
     """

@@ -4,7 +4,8 @@ A map is a lattice of cells.  A coarse lattice is run first.  Then lattices foll
 of the cells are halved: a new cell whose neighbors on the former lattice have the same label is taken to have
 it, too, and any other one is run.  On every lattice each cell that has a neighbor with another label is run,
 until nothing changes.  In the end all cells at a change of the label are run, on both sides of it, and a cell
-that is not run has four neighbors with its label.
+that is not run has the label of all its neighbors: four of them, or three at the rim of the map (its corners
+are run).
 
 The cells of a wave are all needed whatever their labels are.  The next wave follows from the labels of all
 cells before it, so the map depends neither on the order of answers nor on the number of workers.

@@ -175,6 +175,24 @@ def test_the_command_draws_from_runs_that_the_store_has(
     assert [each["key"] for each in json.loads(listed.stdout)] == [record.key]
 
 
+def test_where_there_is_no_scene_nothing_is_run() -> None:
+    one_passes_the_other = {"axes.0.parameter": "vesicles.0.center.0", "axes.0.limits": [-6.0, 6.0]}
+    passing = load(
+        OutcomeMap, "shear-hamaker-map", one_passes_the_other | {"scene.vesicles.1.center": [0.0, 0.0]}
+    )
+    planner = MapPlanner(passing, lambda _: None)
+    while (task := planner.next_task()) is not None:
+        planner.answer(task, answer(task))
+    assert planner.done
+    record = planner.record()
+    assert record.labels == ["bound", "no-scene", "separated"]
+    overlapping = np.abs(passing.axes[0].values) < 1.5
+    np.testing.assert_array_equal((record.numbers == 1).all(axis=1), overlapping)
+    np.testing.assert_array_equal((record.numbers == 1).any(axis=1), overlapping)
+    assert not any(overlapping[each.cell[0]] for each in record.runs)
+    assert {each["label"] for each in record.run_documents()} == {"bound", "separated"}
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -190,7 +208,9 @@ def test_the_command_draws_from_runs_that_the_store_has(
             r"axes\.1\.resolution: 0\.001 — input should be greater",
         ),
         ({"label": "color"}, "label: 'color' — input should be 'outcome' or 'configuration'"),
-        ({"axes.0.limits": [-1.0, 0.5]}, r"flow\.rate: "),
+        ({"axes.0.limits": [-1.0, 0.5]}, r"axes: flow\.rate=-0\.925, adhesion\.hamaker=0\.17 — flow\.rate: "),
+        ({"axes.0.limits": [0.5, 0.500000000001]}, r"axes\.0: limits: must be farther apart"),
+        ({"axes": 5}, "axes: 5 — must be a list$"),
     ],
 )
 def test_what_is_no_map_is_refused(change: dict[str, Any], message: str) -> None:
