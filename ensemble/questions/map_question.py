@@ -165,7 +165,11 @@ class MapQuestion(Question[OutcomeMap]):
         ------
         ValueError
             If there are several; names their keys.
+        StoreError
+            If the map of this key is damaged.
         """
+        if name in store.map_grids.keys():  # noqa: SIM118
+            return _StoredMap(store.map(name))
         maps = store.maps()
         found = [each for each in maps if each.name == name] or [
             each for each in maps if name and (each.key.startswith(name) or each.name.startswith(f"{name}, "))

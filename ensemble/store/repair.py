@@ -1,8 +1,8 @@
-"""Repairs a store: rebuilds a lost or damaged catalog and sets damaged runs aside."""
+"""Repairs a store: rebuilds a lost or damaged catalog and sets damaged runs, boundaries and maps aside."""
 
 from __future__ import annotations
 
-from contextlib import closing
+from contextlib import closing, suppress
 from pathlib import Path
 
 from sqlalchemy.exc import DatabaseError
@@ -21,10 +21,11 @@ from ensemble.store.writers import STAGING
 
 
 def repair(path: Path, on_progress: OnProgress | None = None, processes: int = 1) -> list[str]:
-    """Rebuild a lost or damaged catalog from the runs, adopt whole runs and set damaged ones aside.
+    """Rebuild a lost or damaged catalog, adopt whole runs, and set damaged runs, boundaries and maps aside.
 
-    Nothing is deleted: what cannot be used is moved to `lost+found/`.  Boundaries are only in the
-    catalog; the studies that traced them trace them again without a simulation.
+    Nothing is deleted: what cannot be used is moved to `lost+found/`.  Boundaries that were traced to their
+    end come back from their arrays.  Others are only in the catalog; their studies trace them again without
+    a simulation.
 
     Parameters
     ----------
@@ -66,6 +67,7 @@ def repair(path: Path, on_progress: OnProgress | None = None, processes: int = 1
             if on_progress is not None:
                 on_progress(verified, total)
         done += [_set_aside(store, key, problem) for key, problem in damaged.items()]
+        done += [*_repaired_grids(store), *_restored_boundaries(store)]
     return done
 
 
@@ -77,6 +79,29 @@ def _set_aside(store: Store, key: str, problem: str) -> str:
         return f"{error}; left as it is"
     store.set_aside(key)
     return f"{problem}; set aside, so that it can be made again"
+
+
+def _repaired_grids(store: Store) -> list[str]:
+    """Set aside the files of damaged boundaries and maps."""
+    done = []
+    for shelf in (store.boundary_grids, store.map_grids):
+        for key, problem in shelf.problems().items():
+            if isinstance(problem, OtherVersionError):
+                done.append(f"{problem}; left as it is")
+            else:
+                store.set_grid_aside(shelf, key)
+                done.append(f"{problem}; set aside, so that it can be made again")
+    return done
+
+
+def _restored_boundaries(store: Store) -> list[str]:
+    """Enter the boundaries into the catalog that only their arrays have."""
+    restored = 0
+    for key in store.lost_boundaries():
+        with suppress(OtherVersionError):  # it has been named
+            store.save_boundary(store.boundary_grids.read(key))
+            restored += 1
+    return [f"restored {restored} boundaries that were not in the catalog"] if restored else []
 
 
 def _new_catalog(path: Path) -> list[str]:

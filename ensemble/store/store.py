@@ -15,8 +15,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, suppress
 from functools import cached_property
 from itertools import islice
+from operator import attrgetter
 from pathlib import Path
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from sqlalchemy.exc import DatabaseError
 
@@ -793,11 +794,13 @@ class Store(AbstractContextManager["Store"]):
         return BranchShelf(self.path)
 
     @cached_property
-    def boundary_grids(self) -> GridShelf:
+    def boundary_grids(self) -> GridShelf[Boundary]:
         """The boundaries that are traced, as arrays."""
+        from ensemble.store.boundary_arrays import BOUNDARY_ARRAYS
         from ensemble.store.grid_shelf import GridShelf
 
-        return GridShelf(self.path, BOUNDARIES, "boundary")
+        key_of = attrgetter("study_key")
+        return GridShelf(self.path, BOUNDARIES, "boundary", Boundary, key_of, BOUNDARY_ARRAYS)
 
     def save_boundary_arrays(self, boundary: Boundary) -> None:
         """Keep a boundary that is traced as arrays, too, instead of those of the same study.
@@ -816,11 +819,13 @@ class Store(AbstractContextManager["Store"]):
         self._save_grid(self.boundary_grids, boundary.study_key, boundary, boundary_arrays(boundary))
 
     @cached_property
-    def map_grids(self) -> GridShelf:
+    def map_grids(self) -> GridShelf[MapRecord]:
         """The maps."""
+        from ensemble.search.map_record import MapRecord
         from ensemble.store.grid_shelf import GridShelf
+        from ensemble.store.map_arrays import MAP_ARRAYS
 
-        return GridShelf(self.path, MAPS, "map")
+        return GridShelf(self.path, MAPS, "map", MapRecord, attrgetter("key"), MAP_ARRAYS)
 
     def save_map(self, record: MapRecord) -> None:
         """Keep a map instead of an earlier one that answers the same question.
@@ -841,19 +846,13 @@ class Store(AbstractContextManager["Store"]):
     def maps(self) -> list[MapRecord]:
         """Return all maps, the newest first.
 
+        A damaged one is left out, with a warning that names it.
+
         Returns
         -------
         list of MapRecord
-
-        Raises
-        ------
-        StoreError
-            If one of them is damaged.
         """
-        from ensemble.search.map_record import MapRecord
-
-        records = [self.map_grids.read(key, MapRecord) for key in self.map_grids.keys()]  # noqa: SIM118
-        return sorted(records, key=lambda record: record.updated, reverse=True)
+        return sorted(self.map_grids.readable(), key=lambda record: record.updated, reverse=True)
 
     def map(self, key: str) -> MapRecord:
         """Return a map.
@@ -873,14 +872,35 @@ class Store(AbstractContextManager["Store"]):
         StoreError
             If it is damaged.
         """
-        from ensemble.search.map_record import MapRecord
-
         if key not in self.map_grids.keys():  # noqa: SIM118
             raise NotStored(f"map: there is no map {key} in {self.path}")
-        return self.map_grids.read(key, MapRecord)
+        return self.map_grids.read(key)
+
+    def set_grid_aside(self, shelf: GridShelf[Any], key: str) -> Path:
+        """Take the files of a boundary or of a map out of the store, and keep them.
+
+        Parameters
+        ----------
+        shelf : GridShelf
+            `boundary_grids` or `map_grids`.
+        key : str
+            Of an answer there.
+
+        Returns
+        -------
+        Path
+            Where its files are now.
+        """
+        with locked(self._lock):
+            return self._recovery.set_aside(shelf.place(key))
+
+    def lost_boundaries(self) -> list[str]:
+        """Return the keys of the boundaries that are arrays and not in the catalog."""
+        keys = self.boundary_grids.keys()
+        return [key for key in keys if self._catalog.boundary(key) is None]
 
     def _save_grid(
-        self, shelf: GridShelf, key: str, answer: BaseModel, arrays: Mapping[str, NamedArray]
+        self, shelf: GridShelf[Any], key: str, answer: BaseModel, arrays: Mapping[str, NamedArray]
     ) -> None:
         attributes = answer.model_dump(mode="json")
         try:
@@ -892,7 +912,7 @@ class Store(AbstractContextManager["Store"]):
             ) from error
 
     def check(self, on_progress: OnProgress | None = None, processes: int = 1) -> list[str]:
-        """Verify every run, boundary and branch, and that directory and catalog name the same runs.
+        """Verify every run, boundary, map and branch, and that directory and catalog name the same.
 
         Parameters
         ----------
@@ -906,8 +926,6 @@ class Store(AbstractContextManager["Store"]):
         list of str
             Problems, one sentence each; empty if the store is whole.
         """
-        from ensemble.store.boundary_arrays import BOUNDARY_ARRAYS
-        from ensemble.store.map_arrays import MAP_ARRAYS
         from ensemble.store.verification import CheckNotes, run_problems
 
         problems = []
@@ -915,6 +933,10 @@ class Store(AbstractContextManager["Store"]):
             different = self._recovery.differences()
             total = self._catalog.count_runs()
             boundaries = self._catalog.boundaries(Listing(sort="updated"))
+            lost = [
+                f"boundary {key}: it is in {BOUNDARIES}/ and not in the catalog"
+                for key in self.lost_boundaries()
+            ]
         except DatabaseError as error:
             return [f"the catalog cannot be read ({reason(error)})"]
         for record in boundaries:
@@ -935,8 +957,8 @@ class Store(AbstractContextManager["Store"]):
             notes.write()
             raise
         notes.remove()
-        grids = [*self.boundary_grids.problems(BOUNDARY_ARRAYS), *self.map_grids.problems(MAP_ARRAYS)]
-        return [*different, *problems, *self.branches.problems(), *grids]
+        grids = (*self.boundary_grids.problems().values(), *self.map_grids.problems().values())
+        return [*different, *lost, *problems, *self.branches.problems(), *map(str, grids)]
 
 
 def _unreadable(record: Record) -> list[str]:

@@ -19,9 +19,9 @@ import pytest
 from ensemble.store import Store, StoreError, StoreInputError, staging
 from ensemble.store.merge import merge
 from ensemble.store.repair import repair
-from tests.ensemble.catalog_conformance import NOON, boundary
 from tests.ensemble.group_files import unpacked
 from tests.ensemble.runs import assert_same_run, shear_run, shear_scene
+from tests.ensemble.search.test_boundary_reading import boundary
 
 
 def numbered_run(number: int):
@@ -246,18 +246,19 @@ def test_a_run_whose_commit_fails_is_kept_and_adopted(
 
 def test_merging_brings_runs_and_the_newer_boundaries(tmp_path: Path) -> None:
     first, second = filled(tmp_path / "first", 0, 1), filled(tmp_path / "second", 1, 2)
+    traced = boundary()
     with Store.open(second) as store:
-        store.save_boundary(boundary("a", 0.25, 1.0, NOON))
+        store.save_boundary(traced)
         created = {summary.key: summary.created for summary in store.summaries()}
     before = contents(second)
     with Store.existing(second) as source, Store.open(first) as target:
-        assert merge(source, target) == (1, 1, 0, 1)
-        assert merge(source, target) == (0, 0, 0, 2)
+        assert merge(source, target) == (1, 1, 0, 0, 1)
+        assert merge(source, target) == (0, 0, 0, 0, 2)
         assert target.check() == []
         (new,) = target.summaries([f"flow.rate={numbered_run(2).scene.flow.rate}"])
         assert new.created == created[new.key]
         assert_same_run(target.load(new.key), numbered_run(2))
-        assert target.boundary("a").updated == NOON
+        assert target.boundaries() == [traced]
     assert contents(second) == before
 
 
