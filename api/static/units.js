@@ -20,7 +20,7 @@ export class Units {
   }
 
   /**
-   * @param {string} address - Of a run or a boundary.
+   * @param {string} address - Of a run, a boundary or a map.
    * @param {any} scene - Its scene.
    * @param {AbortSignal} signal
    */

@@ -9,6 +9,7 @@ from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ensemble.config.measured import measured_document
 from ensemble.config.outcome_map import OutcomeMap
 from ensemble.questions.cost import run_work
 from ensemble.questions.question import Answer, Question, StoredAnswer, StoredAnswers, where_kept
@@ -260,15 +261,22 @@ class _StoredMap(StoredAnswer):
         return _StoredMap(self.record.in_units(units))
 
     def json_document(self) -> dict[str, Any]:
-        """Return what the map has come to, the question, the values along both axes and all cells."""
+        """Return what the map has come to, the question, the values along both axes and all cells.
+
+        The values are also in the units of the scene, if it has any.
+        """
         first, second = self.record.question.axes
-        return self.record.summary() | {
-            "question": self.record.map,
-            "values": {first.parameter: first.values, second.parameter: second.values},
-            "labels": self.record.labels,
-            "label_numbers": self.record.cells,
-            "made": self.record.run_documents(),
-        }
+        return (
+            self.record.summary()
+            | {
+                "question": self.record.map,
+                "values": {first.parameter: first.values, second.parameter: second.values},
+                "labels": self.record.labels,
+                "label_numbers": self.record.cells,
+                "made": self.record.run_documents(),
+            }
+            | measured_document(self.record.measured())
+        )
 
     def table(self) -> Table:
         return _table(self.record)

@@ -8,6 +8,7 @@ from typing import Any, Final, Self
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
+from ensemble.config.measured import Measured, dimension_at, measured_values
 from ensemble.config.outcome_map import OutcomeMap
 from ensemble.search.map_refinement import Labels, beside_changes
 from ensemble.timestamp import Timestamp
@@ -98,6 +99,20 @@ class MapRecord(BaseModel):
         """
         scene = self.map["scene"] | {"units": None if units is None else units.model_dump(mode="json")}
         return self.model_copy(update={"map": self.map | {"scene": scene}})
+
+    def measured(self) -> dict[str, Measured]:
+        """Return the values along the axes in the units of the scene.
+
+        Returns
+        -------
+        dict of str to Measured
+            By parameter; without what has no unit.
+        """
+        scene = self.scene
+        values = {
+            axis.parameter: (axis.values, dimension_at(scene, axis.parameter)) for axis in self.question.axes
+        }
+        return measured_values(values, scene.units)
 
     def summary(self) -> dict[str, Any]:
         """Return what the map has come to, as JSON data."""

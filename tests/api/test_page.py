@@ -332,7 +332,7 @@ def test_a_map_is_shown_and_a_dot_leads_to_its_run(page: Page, url: str, store: 
         cells=[[0, 0], [1, 1]],
         runs=[MapRunRecord(cell=(0, 1), run=run_key(run.scene))],
         updated=EARLIER,
-    )
+    ).in_units(Units(radius="10 um", bending_modulus="1e-19 J", viscosity="1 mPa*s"))
     page.goto(f"{url}/#/maps")
     expect(page.get_by_role("link", name="Draw the first one")).to_be_visible()
     with Store.open(store) as opened:
@@ -340,11 +340,16 @@ def test_a_map_is_shown_and_a_dot_leads_to_its_run(page: Page, url: str, store: 
     page.goto(f"{url}/#/maps/{record.key}")
     expect(page.get_by_role("heading", level=1)).to_have_text("Outcome over shear rate and Hamaker constant")
     expect(page.locator(".heatmaplayer image")).to_have_count(1)
+    expect(page.locator(".diagram")).to_contain_text("shear rate γ̇ (1/s)")
+    regions = page.locator(".diagram").evaluate("plot => plot.data[0]")
+    assert regions["x"] == pytest.approx([0.02, 0.09, 0.16])
     expect(page.get_by_role("table", name="Shares of the map")).to_contain_text("50 %")
     dot = page.locator(".scatterlayer .point").first.bounding_box()
     assert dot is not None
     page.mouse.click(dot["x"] + dot["width"] / 2, dot["y"] + dot["height"] / 2)
     page.wait_for_url(f"**/runs/{run_key(run.scene)}**")
+    page.goto(f"{url}/#/maps/{16 * '0'}")
+    expect(page.get_by_role("link", name="Back to maps")).to_be_visible()
 
 
 def test_the_name_of_a_study_is_not_interpreted_as_html(page: Page, url: str, store: Path) -> None:

@@ -1,6 +1,6 @@
 /** The maps of the store, and one of them in detail: the selected one or the newest. */
 
-import { getAll } from "../api.js";
+import { get, getAll } from "../api.js";
 import { title } from "../diagram.js";
 import { element, table } from "../dom.js";
 import { downloads } from "../downloads.js";
@@ -10,6 +10,7 @@ import { Plot, axis } from "../plot.js";
 import { goTo } from "../router.js";
 import { describe, quantity } from "../symbols.js";
 import { color } from "../theme.js";
+import { Units, inUnits } from "../units.js";
 
 /**
  * @typedef {object} OutcomeMap
@@ -24,15 +25,23 @@ import { color } from "../theme.js";
  * @property {string} updated
  */
 
+/**
+ * @typedef {object} ListedMap
+ * @property {string} key
+ * @property {string} name
+ * @property {number} runs
+ * @property {string} updated
+ */
+
 const OTHER_COLORS = ["bound", "undecided", "end-to-end", "steady", "equilibrium", "separated"];
 
 /** @param {import("../router.js").Place} place */
 export async function showMaps({ content, parameters, signal }) {
-  /** @type {OutcomeMap[]} */
+  /** @type {ListedMap[]} */
   const maps = await getAll("/maps", signal);
   maps.sort((first, second) => second.updated.localeCompare(first.updated));
-  const shown = maps.find(({ key }) => key === parameters.key) ?? maps[0];
-  if (!shown) {
+  const key = parameters.key ?? maps[0]?.key;
+  if (key === undefined) {
     const link = element("a", { href: "#/new?preset=shear-hamaker-map" }, "Draw the first one");
     content.replaceChildren(
       element("h1", {}, "Maps"),
@@ -40,20 +49,23 @@ export async function showMaps({ content, parameters, signal }) {
     );
     return;
   }
+  /** @type {OutcomeMap} */
+  const shown = await get(`/maps/${key}`, signal);
+  const units = await Units.of(`/maps/${key}`, shown.map.scene, signal);
   document.title = `${words(shown.name)} – Vesicle ensemble`;
   const figure = element("div", { class: "plot diagram", role: "application", "aria-label": titleOf(shown) });
   const plot = new Plot(figure, signal);
   plot.on("plotly_click", ({ points: [point] }) => point.customdata && goTo(`/runs/${point.customdata}`));
   content.replaceChildren(
     element("h1", {}, titleOf(shown)),
-    element("p", {}, element("code", {}, shown.name), `: ${describe(shown.map.scene, pathsOf(shown))}`),
+    element("p", {}, element("code", {}, shown.name), `: ${describe(shown.map.scene, pathsOf(shown), units)}`),
     figure,
-    element("p", { class: "note" }, "Each dot is a run, and a click opens it. Cells without one have the label around them."),
-    downloads(`/maps/${shown.key}/file`, `map-${shown.key.slice(0, 8)}`, [["svg", "figure"]]),
+    element("p", { class: "note" }, "Each dot is a run, and a click opens it. Cells without one have the label around them, or no scene."),
+    downloads(`/maps/${key}/file`, `map-${key.slice(0, 8)}`, [["svg", "figure"]]),
     shares(shown),
-    ...others(maps, shown),
+    ...others(maps, key),
   );
-  await plot.draw(() => mapFigure(shown));
+  await plot.draw(() => mapFigure(shown, units));
 }
 
 /** @param {OutcomeMap} shown */
@@ -79,8 +91,8 @@ function shares({ labels, cells, runs }) {
 }
 
 /**
- * @param {OutcomeMap[]} maps
- * @param {OutcomeMap} shown
+ * @param {ListedMap[]} maps
+ * @param {string} shown - Key.
  */
 function others(maps, shown) {
   if (maps.length < 2) {
@@ -92,20 +104,24 @@ function others(maps, shown) {
       {},
       element(
         "a",
-        { href: `#/maps/${key}`, "aria-current": key === shown.key ? "true" : null },
+        { href: `#/maps/${key}`, "aria-current": key === shown ? "true" : null },
         element("strong", {}, words(name)),
-        element("span", {}, `${runs.length} runs, ${dateAndTime(updated)}`),
+        element("span", {}, `${runs} runs, ${dateAndTime(updated)}`),
       ),
     ),
   );
   return [element("section", { class: "shelf" }, element("h2", {}, "All maps"), element("ul", {}, ...links))];
 }
 
-/** @param {OutcomeMap} shown */
-function mapFigure(shown) {
+/**
+ * @param {OutcomeMap} shown
+ * @param {Units} units
+ */
+function mapFigure(shown, units) {
   const { labels, cells, runs, edges, values, map } = shown;
   const colors = labels.map((label, index) => color(MARKS[label]?.color ?? OTHER_COLORS[index % OTHER_COLORS.length]));
-  const [x, y] = pathsOf(shown).map((/** @type {string} */ path) => title(quantity(path, map.scene)));
+  const paths = pathsOf(shown);
+  const [x, y] = paths.map((/** @type {string} */ path) => units.label(title(quantity(path, map.scene)), path));
   const [horizontal, vertical] = map.axes.map((/** @type {{spacing: string}} */ { spacing }) =>
     spacing === "linear" ? "linear" : "log",
   );
@@ -113,7 +129,7 @@ function mapFigure(shown) {
     [index / colors.length, name],
     [(index + 1) / colors.length, name],
   ]);
-  return {
+  const figure = {
     data: [
       {
         type: "heatmap",
@@ -151,4 +167,5 @@ function mapFigure(shown) {
       hovermode: "closest",
     },
   };
+  return inUnits(figure, { x: units.size(paths[0]), y: units.size(paths[1]) });
 }

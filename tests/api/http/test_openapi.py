@@ -60,6 +60,7 @@ def test_every_route_is_described(paths):
         ("get", "/maps"),
         ("get", "/maps/{key}"),
         ("get", "/maps/{key}/file"),
+        ("get", "/maps/{key}/units"),
         ("get", "/presets"),
         ("get", "/reports"),
         ("get", "/reports/{name}"),
