@@ -329,7 +329,7 @@ def read_submission(body: bytes) -> SubmissionFields:
         return Submission.model_validate_json(body, strict=True, context={})
     except ValidationError as error:
         errors = error.errors(include_url=False)[:MAXIMUM_FIELDS]
-        raise BadInput(describe(errors, {})) from error
+        raise BadInput(describe(errors, document if isinstance(document, dict) else {})) from error
     except ValueError as error:
         raise BadInput(f"body: {error}") from error
 

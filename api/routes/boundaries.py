@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from http import HTTPStatus
 from typing import Annotated, Any
 
@@ -159,12 +160,14 @@ def get_critical_value(
     NotStored
         If there is no boundary of this key.
     BadInput
-        If a value of a swept parameter is missing, is no number or lies outside the boundary.
+        If a value of a swept parameter is missing, is given twice, is no number or lies outside the boundary.
     """
     boundary = reader.service.store.boundary(key)
-    parameters = {
-        name: _number(name, text) for name, text in request.query_params.multi_items() if name != "method"
-    }
+    given = [(name, text) for name, text in request.query_params.multi_items() if name != "method"]
+    parameters = {name: _number(name, text) for name, text in given}
+    if len(given) > len(parameters):
+        twice = ", ".join(name for name, times in Counter(name for name, _ in given).items() if times > 1)
+        raise BadInput(f"{twice}: given several times — must be given once")
     return critical_value_at(boundary, parameters, method)
 
 

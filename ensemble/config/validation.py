@@ -165,7 +165,8 @@ def _without_tags(location: Location, document: Mapping[str, Any]) -> Location:
         if isinstance(node, str | int | float):
             break
         is_kind = isinstance(node, Mapping) and part not in node and part in node.values()
-        is_tag = is_kind or (part in (ONE, SEVERAL) and value_at(node, (part,)) is None)
+        is_name = part in (ONE, SEVERAL) or "[" in str(part)  # such as str-enum[Outcome]
+        is_tag = is_kind or (is_name and value_at(node, (part,)) is None)
         if not is_tag:
             kept.append(part)
     return tuple(kept)

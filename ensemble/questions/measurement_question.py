@@ -377,7 +377,7 @@ class _MeasuredAdhesion(Answer):
         others = math.hypot(*(error for name, error in self._contributions.items() if name != "rate"))
         step = min(max(math.sqrt(12) * others / slope, _STEPS[0]), _STEPS[1])
         reach = max(3 * self.measurement.errors.rate, 2 * step)
-        growth = self.loss.shortly_before.state.eigenvalues[0].real
+        growth = float(self.loss.shortly_before.state.eigenvalues[0].real)
         return {
             "from": rate * max(1 - reach, 0.0),
             "to": rate * (1 + reach),

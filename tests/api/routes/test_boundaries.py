@@ -129,6 +129,7 @@ def test_the_nearest_point_says_where_it_is(reading, address):
         ({"adhesion.distance": 0.4}, "flow.rate"),
         ({"flow.rate": 0.5, "adhesion.distance": 0.4}, "flow.rate"),
         ({"flow.rate": 0.5, "method": "guess"}, "method"),
+        ({"flow.rate": [0.5, 0.6]}, "flow.rate: given several times"),
     ],
 )
 def test_values_that_cannot_be_read_are_refused(reading, address, query, named):

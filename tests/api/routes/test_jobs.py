@@ -82,6 +82,12 @@ def test_a_scene_with_units_makes_the_same_job(submitting, queue):
     assert (document["units"], document["flow"]["rate"]) == (UNITS, 0.5)
 
 
+def with_low(outcome: str | None) -> dict[str, Any]:
+    """A study with something else for an outcome."""
+    study = load_study("critical-hamaker").model_dump(mode="json")
+    return study | {"search": study["search"] | {"low": [outcome]}}
+
+
 @pytest.mark.parametrize(
     ("submission", "named"),
     [
@@ -100,6 +106,8 @@ def test_a_scene_with_units_makes_the_same_job(submitting, queue):
         ({"preset": "doublet-shear", "ranks": 0}, "ranks"),
         ({"preset": "doublet-shear", "ranks": 1.5}, "ranks"),
         ({"preset": "doublet-shear", "seconds": 0}, "seconds"),
+        ({"study": with_low("x")}, "study.search.low.0: 'x' — input should be 'bound', "),
+        ({"study": with_low(None)}, "study.search.low.0: None — input should be 'bound', "),
         ([], "object"),
     ],
 )

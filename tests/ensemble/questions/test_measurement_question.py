@@ -79,6 +79,7 @@ def test_errors_are_those_that_another_value_of_an_input_shows(document, name, v
     """Of the quantities with units, while all other inputs are the same in the laboratory."""
     inputs = UNITS | MEASURED | {INPUTS[name]: value}
     changed = answer_about(load_scene("doublet-trap", [*PAIR, *map("=".join, inputs.items())]), **{name: 0.5})
+    assert {type(each) for each in changed["plan"].values()} == {float}
     for name in ("hamaker", "adhesion_energy"):
         before, after = (each["in_units"][name] for each in (document, changed))
         assert before["unit"] == after["unit"]
