@@ -317,11 +317,12 @@ class _ChangedPoints:
         """Return a line for each point that has changed since the last snapshot."""
         lines = []
         progress = snapshot.progress
-        left = "" if progress.seconds_left is None else f", about {_duration(progress.seconds_left)} left"
+        so_far = f"{progress.runs} runs, {len(progress.running)} running"
+        left = "" if progress.seconds_left is None else f", {_duration(progress.seconds_left)} left"
         for point in snapshot.boundary.points:
             at = snapshot.boundary.place(point)
             line = f"{place_text(point.parameters)}: {bracket_text(point)} {point.status}"
             if point.runs and line != self._shown.get(at):
                 self._shown[at] = line
-                lines.append(f"{_duration(progress.elapsed)} {line}; {progress.runs} runs{left}")
+                lines.append(f"{line}; {so_far}{left}")
         return lines

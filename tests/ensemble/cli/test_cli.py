@@ -475,4 +475,4 @@ def test_the_schema_of_a_kind_of_documents_is_printed(ensemble):
     assert json.loads(ensemble("schema", "scene").stdout)["required"] == ["horizon"]
     refused = ensemble("schema", "novel")
     assert (refused.returncode, refused.stdout) == (2, "")
-    assert "kinds: study, map, scene" in refused.stderr
+    assert "kinds: study, map, measurement, scene" in refused.stderr

@@ -43,6 +43,7 @@ MANY = ("cluster-quiescent", "suspension-shear")
 SCENES = (*PUBLISHED, *MANY, "doublet-linear", "doublet-ramp", "vesicle-poiseuille", "doublet-unequal")
 
 MAPS = ("shear-hamaker-map",)
+MEASUREMENTS = ("adhesion-measurement",)
 
 HAMAKER = load_study("critical-hamaker")
 
@@ -58,7 +59,7 @@ def ellipse_half_width(reduced_area: float, length: float) -> float:
 
 
 def test_all_presets_ship() -> None:
-    assert preset_names() == tuple(sorted(STUDIES + SCENES + MAPS))
+    assert preset_names() == tuple(sorted(STUDIES + SCENES + MAPS + MEASUREMENTS))
 
 
 @pytest.mark.parametrize("name", STUDIES)
