@@ -176,7 +176,7 @@ def check(  # numpydoc ignore=PR01
         bool,
         typer.Option(
             "--repair",
-            help="Rebuild a lost catalog; set damaged runs, boundaries and maps aside in lost+found.",
+            help="Rebuild a lost catalog; set damaged runs and other answers aside in lost+found.",
         ),
     ] = False,
     processes: Annotated[

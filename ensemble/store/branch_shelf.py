@@ -6,8 +6,10 @@ The rename makes it exist.  There are few branches, so the directory itself is t
 
 from __future__ import annotations
 
+import logging
 import os
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,7 +17,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from ensemble.disk import flush, flush_tree, locked
-from ensemble.errors import StoreError
+from ensemble.errors import OtherVersionError, StoreError
 from ensemble.search.branch_summary import BranchSummary, branch_key
 from ensemble.store.branch_record import branch_arrays
 from ensemble.store.run_record import first_problem
@@ -28,6 +30,8 @@ if TYPE_CHECKING:
     from solver.simulation.steady_scenes import SteadyBranch
 
 BRANCHES = "branches"
+
+_log = logging.getLogger(__name__)
 
 
 class BranchShelf:
@@ -74,10 +78,8 @@ class BranchShelf:
         StoreError
             If the branch is damaged.
         """
-        directory = source._branches / key
-        problems = _problems(directory)
-        if problems:
-            raise StoreError(problems[0])
+        directory = source.place(key)
+        _require_whole(directory)
         self._keep(shutil.copytree(directory, unfinished / f"{key}.branch"), key)
 
     def _keep(self, partial: Path, key: str) -> None:
@@ -103,6 +105,19 @@ class BranchShelf:
         """
         return is_own_directory(self._branches / key)
 
+    def place(self, key: str) -> Path:
+        """Return the directory of a branch.
+
+        Parameters
+        ----------
+        key : str
+
+        Returns
+        -------
+        Path
+        """
+        return self._branches / key
+
     def summary(self, key: str) -> BranchSummary:
         """Return everything about a branch except its arrays.
 
@@ -118,32 +133,43 @@ class BranchShelf:
         ------
         StoreError
             If it is not there, or its files are damaged.
+        OtherVersionError
+            If this version cannot read it.
         """
         return _summary(StoredGroup(self._branches / key, "branch"))
 
     def summaries(self) -> list[BranchSummary]:
         """Return the summaries of all branches, oldest first.
 
+        A damaged one is left out, with a warning that names it.
+
         Returns
         -------
         list of BranchSummary
         """
-        return sorted((self.summary(key) for key in self.keys()), key=lambda summary: summary.created)
+        return sorted(self._readable(), key=lambda summary: summary.created)
 
-    def problems(self) -> list[str]:
+    def _readable(self) -> Iterator[BranchSummary]:
+        for key in self.keys():
+            try:
+                yield self.summary(key)
+            except StoreError as error:
+                _log.warning("store: %s; left out", error)
+
+    def problems(self) -> dict[str, StoreError]:
         """Verify every branch.
 
         Returns
         -------
-        list of str
-            One sentence each; empty if all are whole.
+        dict of str to StoreError
+            What is wrong, by the keys of those that are not whole.
         """
-        found = []
+        found = {}
         for key in self.keys():
             try:
-                found += _problems(self._branches / key)
+                _require_whole(self.place(key))
             except StoreError as error:
-                found.append(str(error))
+                found[key] = error
         return found
 
     def keys(self) -> list[str]:
@@ -162,19 +188,22 @@ def _summary(group: StoredGroup) -> BranchSummary:
     try:
         return BranchSummary.model_validate(group.attributes)
     except ValidationError as error:
-        raise StoreError(f"{group.name}: unreadable attributes ({first_problem(error)})") from error
+        # An archive has checksums, so these are the attributes that were written.
+        raise OtherVersionError(
+            f"{group.name}: this version cannot read its record ({first_problem(error)})"
+        ) from error
 
 
-def _problems(directory: Path) -> list[str]:
-    """Return what is wrong with the files of a branch."""
+def _require_whole(directory: Path) -> None:
+    """Raise an error that names what is wrong with the files of a branch, if anything is."""
     group = StoredGroup(directory, "branch")
-    name, summary = group.name, _summary(group)
+    summary = _summary(group)
     problems = []
     if summary.key != directory.name:
-        problems.append(f"{name}: its attributes have the key {summary.key}")
+        problems.append(f"its attributes have the key {summary.key}")
     expected = branch_key(summary.scene, summary.parameter, summary.to)
     if summary.results_revision == RESULTS_REVISION and summary.key != expected:
-        problems.append(f"{name}: its key is not that of its scene")
+        problems.append("its key is not that of its scene")
     vesicles = len(summary.scene.vesicles)
     parts = {"": summary.branch, "fold_": summary.folds, "crossing_": summary.crossings}
     for prefix, points in parts.items():
@@ -184,8 +213,9 @@ def _problems(directory: Path) -> list[str]:
             group.whole(f"{prefix}{array}") for array in ("parameter", "tangent_angle", "center")
         )
         if not np.array_equal(values, [point.value for point in points]):
-            problems.append(f"{name}: array {prefix}parameter differs from its attributes")
+            problems.append(f"array {prefix}parameter differs from its attributes")
         for array, values in (("tangent_angle", angles), ("center", centers)):
             if values.shape[:2] != (len(points), vesicles) or not np.isfinite(values).all():
-                problems.append(f"{name}: array {prefix}{array} is not that of its points")
-    return problems
+                problems.append(f"array {prefix}{array} is not that of its points")
+    if problems:
+        raise StoreError(f"{group.name}: {', '.join(problems)}")

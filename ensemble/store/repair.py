@@ -1,4 +1,4 @@
-"""Repairs a store: rebuilds a lost or damaged catalog and sets damaged runs, boundaries and maps aside."""
+"""Repairs a store: rebuilds a lost or damaged catalog and sets aside whatever is damaged."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from ensemble.store.writers import STAGING
 
 
 def repair(path: Path, on_progress: OnProgress | None = None, processes: int = 1) -> list[str]:
-    """Rebuild a lost or damaged catalog, adopt whole runs, and set damaged runs, boundaries and maps aside.
+    """Rebuild a lost or damaged catalog, adopt whole runs, and set damaged runs and other answers aside.
 
     Nothing is deleted: what cannot be used is moved to `lost+found/`.  Boundaries that were traced to their
     end come back from their arrays.  Others are only in the catalog; their studies trace them again without
@@ -67,7 +67,7 @@ def repair(path: Path, on_progress: OnProgress | None = None, processes: int = 1
             if on_progress is not None:
                 on_progress(verified, total)
         done += [_set_aside(store, key, problem) for key, problem in damaged.items()]
-        done += [*_repaired_grids(store), *_restored_boundaries(store)]
+        done += [*_repaired_answers(store), *_restored_boundaries(store)]
     return done
 
 
@@ -81,15 +81,15 @@ def _set_aside(store: Store, key: str, problem: str) -> str:
     return f"{problem}; set aside, so that it can be made again"
 
 
-def _repaired_grids(store: Store) -> list[str]:
-    """Set aside the files of damaged boundaries and maps."""
+def _repaired_answers(store: Store) -> list[str]:
+    """Set aside the files of damaged branches, boundaries and maps."""
     done = []
-    for shelf in (store.boundary_grids, store.map_grids):
+    for shelf in store.shelves:
         for key, problem in shelf.problems().items():
             if isinstance(problem, OtherVersionError):
                 done.append(f"{problem}; left as it is")
             else:
-                store.set_grid_aside(shelf, key)
+                store.set_answer_aside(shelf, key)
                 done.append(f"{problem}; set aside, so that it can be made again")
     return done
 

@@ -876,13 +876,18 @@ class Store(AbstractContextManager["Store"]):
             raise NotStored(f"map: there is no map {key} in {self.path}")
         return self.map_grids.read(key)
 
-    def set_grid_aside(self, shelf: GridShelf[Any], key: str) -> Path:
-        """Take the files of a boundary or of a map out of the store, and keep them.
+    @property
+    def shelves(self) -> tuple[BranchShelf | GridShelf[Any], ...]:
+        """The answers that are arrays in a directory each."""
+        return (self.branches, self.boundary_grids, self.map_grids)
+
+    def set_answer_aside(self, shelf: BranchShelf | GridShelf[Any], key: str) -> Path:
+        """Take the files of a branch, a boundary or a map out of the store, and keep them.
 
         Parameters
         ----------
-        shelf : GridShelf
-            `boundary_grids` or `map_grids`.
+        shelf : BranchShelf or GridShelf
+            One of `shelves`.
         key : str
             Of an answer there.
 
@@ -957,8 +962,8 @@ class Store(AbstractContextManager["Store"]):
             notes.write()
             raise
         notes.remove()
-        grids = (*self.boundary_grids.problems().values(), *self.map_grids.problems().values())
-        return [*different, *lost, *problems, *self.branches.problems(), *map(str, grids)]
+        shelved = [str(problem) for shelf in self.shelves for problem in shelf.problems().values()]
+        return [*different, *lost, *problems, *shelved]
 
 
 def _unreadable(record: Record) -> list[str]:

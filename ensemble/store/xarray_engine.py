@@ -5,24 +5,19 @@ The entry point ``xarray.backends`` of the package names this module.
 
 from __future__ import annotations
 
-import logging
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, ClassVar
 
 from xarray import Dataset, DataTree
 from xarray.backends import BackendEntrypoint
 
-from ensemble.errors import StoreError
-from ensemble.search.branch_summary import BranchSummary
 from ensemble.store.boundary_arrays import boundary_dataset
 from ensemble.store.datasets import branch_dataset, run_dataset
 from ensemble.store.map_arrays import map_dataset
 from ensemble.store.store import Store
 from ensemble.store.store_directory import exists
-
-_log = logging.getLogger(__name__)
 
 
 class StoreEntrypoint(BackendEntrypoint):
@@ -66,7 +61,10 @@ class StoreEntrypoint(BackendEntrypoint):
             groups |= {f"/runs/{each.key}": run_dataset(store.path, each) for each in store.summaries(where)}
             groups |= {f"/boundaries/{each.study_key}": boundary_dataset(each) for each in store.boundaries()}
             groups |= {f"/maps/{each.key}": map_dataset(each) for each in store.maps()}
-            groups |= {f"/branches/{each.key}": branch_dataset(store.path, each) for each in _branches(store)}
+            groups |= {
+                f"/branches/{each.key}": branch_dataset(store.path, each)
+                for each in store.branches.summaries()
+            }
         return {path: data.drop_vars(drop_variables or (), errors="ignore") for path, data in groups.items()}
 
     def open_datatree(
@@ -107,11 +105,3 @@ class StoreEntrypoint(BackendEntrypoint):
         with Store.existing(Path(filename_or_obj)) as store:
             data = run_dataset(store.path, store.summary(store.full_key(key)))
         return data.drop_vars(drop_variables or (), errors="ignore")
-
-
-def _branches(store: Store) -> Iterator[BranchSummary]:
-    for key in store.branches.keys():  # noqa: SIM118  no mapping
-        try:
-            yield store.branches.summary(key)
-        except StoreError as error:
-            _log.warning("store: %s; left out", error)

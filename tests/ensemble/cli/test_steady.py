@@ -15,6 +15,7 @@ from ensemble.questions import INCOMPLETE_STATUS
 from ensemble.questions.branches import StoredBranches
 from ensemble.store import Store, StoreError, StoreInputError
 from ensemble.store.listing import Listing
+from ensemble.store.repair import repair
 from tests.ensemble.group_files import unpacked
 
 TREADING = (
@@ -120,6 +121,20 @@ def test_a_damaged_branch_is_noticed(followed, tmp_path):
         opened.branches.summary(document["key"])
         with pytest.raises(StoreError):
             opened.branches.summary("0" * 32)
+
+
+def test_a_damaged_branch_is_left_out_and_set_aside(followed, tmp_path):
+    store, document = followed
+    copy = shutil.copytree(store, tmp_path / "copy")
+    (copy / "branches" / document["key"] / "zarr.zip").write_bytes(b"damaged")
+    with Store.existing(copy) as opened:
+        assert opened.branches.summaries() == []
+    assert "branches" not in xarray.open_datatree(copy)
+    (done,) = repair(copy)
+    assert document["key"] in done
+    assert (copy / "lost+found" / document["key"] / "zarr.zip").read_bytes() == b"damaged"
+    with Store.existing(copy) as opened:
+        assert opened.check() == []
 
 
 def test_the_diagram_shows_stable_and_unstable_parts_up_to_the_fold(followed):
