@@ -46,10 +46,16 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
-    """Compile the kernels before there are processes that would each compile the same ones."""
+    """Compile the kernels before there are processes that would each compile the same ones.
+
+    Two processes begin at either end; what one of them has compiled the other one loads.
+    """
     if session.config.getoption("numprocesses") and not hasattr(session.config, "workerinput"):
         command = [sys.executable, "-m", "tests.solver.compile_kernels"]
-        subprocess.run(command, cwd=session.config.rootpath, check=True)
+        both = [
+            subprocess.Popen([*command, *order], cwd=session.config.rootpath) for order in ([], ["reversed"])
+        ]
+        assert [process.wait() for process in both] == [0, 0]
 
 
 @dataclass(frozen=True)

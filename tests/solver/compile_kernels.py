@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 from solver.scene import LARGEST_DENSE, PowerLaw, Scene
 from solver.simulation.simulate import simulate
 from tests.solver.scenes import uneven_pair, with_contrasts
@@ -28,5 +30,6 @@ def scenes_that_use_every_kernel() -> list[Scene]:
 
 
 if __name__ == "__main__":
-    for scene in scenes_that_use_every_kernel():
+    scenes = scenes_that_use_every_kernel()
+    for scene in reversed(scenes) if "reversed" in sys.argv else scenes:
         simulate(scene)
