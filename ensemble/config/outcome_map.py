@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import math
 from functools import cached_property
 from itertools import product
@@ -14,6 +12,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from ensemble.config.overrides import LONGEST_NAME, override
 from ensemble.config.parameter_values import ValueOf, number_locations, remember_scene
+from ensemble.config.question_key import question_key
 from ensemble.config.validation import validated
 from solver.analysis.run_labels import LABELS
 from solver.scene import Model, Scene
@@ -138,10 +137,8 @@ class OutcomeMap(Model):
 
     @cached_property
     def key(self) -> str:
-        """Key of the map: 16 hexadecimal digits of the SHA-256 of its canonical JSON, without units."""
-        document = self.model_dump(mode="json", exclude={"scene": {"units"}})
-        canonical = json.dumps(document, sort_keys=True, separators=(",", ":"))
-        return hashlib.sha256(canonical.encode()).hexdigest()[:16]
+        """Key of the map: 16 hexadecimal digits, whatever the units of its scene."""
+        return question_key(self)
 
     @property
     def shape(self) -> tuple[int, int]:

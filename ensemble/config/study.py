@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from functools import cached_property
 from itertools import product
 from typing import Annotated, Any, Self
@@ -15,6 +13,7 @@ from ensemble.config.dotted_paths import Location
 from ensemble.config.geometric_grid import GeometricGrid
 from ensemble.config.overrides import LONGEST_NAME, override
 from ensemble.config.parameter_values import OneOrSeveral, ValueOf, number_locations, remember_scene
+from ensemble.config.question_key import question_key
 from ensemble.config.validation import validated
 from solver.analysis.run import Configuration, Outcome
 from solver.scene import Model, Positive, Scene
@@ -226,10 +225,8 @@ class Study(Model):
 
     @cached_property
     def key(self) -> str:
-        """Key of the study: 16 hexadecimal digits of the SHA-256 of its canonical JSON, without units."""
-        document = self.model_dump(mode="json", exclude={"scene": {"units"}})
-        canonical = json.dumps(document, sort_keys=True, separators=(",", ":"))
-        return hashlib.sha256(canonical.encode()).hexdigest()[:16]
+        """Key of the study: 16 hexadecimal digits, whatever the units of its scene."""
+        return question_key(self)
 
     def scene_at(self, at: tuple[float, ...], value: float) -> Scene:
         """Return the scene with some values of the parameters.

@@ -110,7 +110,7 @@ class BranchQuestion:
         with opened(path) as store:
             key = branch_key(self.scene, self.parameter, self.to)
             if store is not None and store.branches.contains(key):
-                summary = store.branches.summary(key).in_units(self.scene.units)
+                summary = store.branches.read(key).in_units(self.scene.units)
                 return _FollowedBranch(summary, clock.perf_counter() - began)
             near = _end_of_run(self.scene, store)
             if isinstance(near, str):
@@ -415,7 +415,7 @@ class StoredBranches:
             None if there is no such branch.
         """
         keys = [key for key in store.branches.keys() if name and key.startswith(name)]  # noqa: SIM118
-        return _StoredBranch(store.branches.summary(keys[0])) if len(keys) == 1 else None
+        return _StoredBranch(store.branches.read(keys[0])) if len(keys) == 1 else None
 
     @classmethod
     def all_stored(cls, store: Store, listing: Listing, columns: Sequence[str]) -> StoredAnswers:

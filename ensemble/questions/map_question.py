@@ -169,7 +169,7 @@ class MapQuestion(Question[OutcomeMap]):
         StoreError
             If the map of this key is damaged.
         """
-        if name in store.map_grids.keys():  # noqa: SIM118
+        if store.map_grids.contains(name):
             return _StoredMap(store.map(name))
         maps = store.maps()
         found = [each for each in maps if each.name == name] or [

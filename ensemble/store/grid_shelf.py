@@ -6,28 +6,23 @@ rename of its file.  It replaces the one of an earlier answer to the same questi
 
 from __future__ import annotations
 
-import logging
 import os
 import shutil
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any
 
-from pydantic import BaseModel, ValidationError
-
+from ensemble.config.question_key import QUESTION_KEY_DIGITS
 from ensemble.disk import flush, flush_tree, locked
-from ensemble.errors import OtherVersionError, StoreError
-from ensemble.store.run_record import NamedArray, first_problem
+from ensemble.errors import StoreError
+from ensemble.store.run_record import NamedArray
+from ensemble.store.shelf import Shelf, SomeRecord
 from ensemble.store.staging import STORE_LOCK
 from ensemble.store.zarr_groups import ARCHIVE, StoredGroup, write_group
 
-SomeAnswer = TypeVar("SomeAnswer", bound=BaseModel)
 
-_log = logging.getLogger(__name__)
-
-
-class GridShelf(Generic[SomeAnswer]):
-    """The answers of one kind in a store.
+class GridShelf(Shelf[SomeRecord]):
+    """The answers of one kind on a grid of parameters.
 
     Parameters
     ----------
@@ -50,14 +45,11 @@ class GridShelf(Generic[SomeAnswer]):
         store: Path,
         folder: str,
         kind: str,
-        model: type[SomeAnswer],
-        key_of: Callable[[SomeAnswer], str],
+        model: type[SomeRecord],
+        key_of: Callable[[SomeRecord], str],
         arrays: tuple[str, ...],
     ) -> None:
-        self._store = store
-        self._directory = store / folder
-        self._kind = kind
-        self._model = model
+        super().__init__(store, folder, kind, model, QUESTION_KEY_DIGITS)
         self._key_of = key_of
         self._arrays = arrays
 
@@ -89,27 +81,8 @@ class GridShelf(Generic[SomeAnswer]):
             flush(self._directory)
         shutil.rmtree(partial, ignore_errors=True)
 
-    def keys(self) -> list[str]:
-        """Return the keys of all answers, damaged ones too, in their order."""
-        if not self._directory.is_dir():
-            return []
-        return sorted(place.name for place in self._directory.iterdir() if place.is_dir())
-
-    def place(self, key: str) -> Path:
-        """Return the directory of an answer.
-
-        Parameters
-        ----------
-        key : str
-
-        Returns
-        -------
-        Path
-        """
-        return self._directory / key
-
-    def read(self, key: str) -> SomeAnswer:
-        """Read an answer without its arrays.
+    def read(self, key: str) -> SomeRecord:
+        """Read an answer without its arrays; see `Shelf`.
 
         Parameters
         ----------
@@ -123,58 +96,18 @@ class GridShelf(Generic[SomeAnswer]):
         Raises
         ------
         StoreError
-            If it is not there, its files are damaged, or they are those of another one.
-        OtherVersionError
-            If this version cannot read it.
+            Also if its files are those of another one.
         """
         return self._answer_of(self._group(key), key)
 
-    def readable(self) -> Iterator[SomeAnswer]:
-        """Read all answers without their arrays, leaving out damaged ones, with a warning that names each.
+    def _require_whole(self, key: str) -> None:
+        group = self._group(key)
+        self._answer_of(group, key)
+        for array in self._arrays:
+            group.whole(array)
 
-        Yields
-        ------
-        BaseModel
-            An instance of the model.
-        """
-        for key in self.keys():
-            try:
-                answer = self.read(key)
-            except StoreError as error:
-                _log.warning("store: %s; left out", error)
-            else:
-                yield answer
-
-    def problems(self) -> dict[str, StoreError]:
-        """Verify every answer.
-
-        Returns
-        -------
-        dict of str to StoreError
-            What is wrong, by the keys of those that are not whole.
-        """
-        found = {}
-        for key in self.keys():
-            try:
-                group = self._group(key)
-                self._answer_of(group, key)
-                for array in self._arrays:
-                    group.whole(array)
-            except StoreError as error:
-                found[key] = error
-        return found
-
-    def _group(self, key: str) -> StoredGroup:
-        return StoredGroup(self.place(key), self._kind)
-
-    def _answer_of(self, group: StoredGroup, key: str) -> SomeAnswer:
-        try:
-            answer = self._model.model_validate(group.attributes)
-        except ValidationError as error:
-            # An archive has checksums, so these are the attributes that were written.
-            raise OtherVersionError(
-                f"{group.name}: this version cannot read its record ({first_problem(error)})"
-            ) from error
+    def _answer_of(self, group: StoredGroup, key: str) -> SomeRecord:
+        answer = self._record_of(group)
         if self._key_of(answer) != key:
             raise StoreError(f"{group.name}: it is {self._kind} {self._key_of(answer)}")
         return answer

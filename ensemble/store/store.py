@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from ensemble.store.grid_shelf import GridShelf
     from ensemble.store.recorded_blocks import RecordedBlocks
     from ensemble.store.run_record import NamedArray
+    from ensemble.store.shelf import Shelf
     from ensemble.store.verification import OnProgress
     from solver.analysis.run import RunResults
     from solver.scene import Scene
@@ -872,21 +873,21 @@ class Store(AbstractContextManager["Store"]):
         StoreError
             If it is damaged.
         """
-        if key not in self.map_grids.keys():  # noqa: SIM118
+        if not self.map_grids.contains(key):
             raise NotStored(f"map: there is no map {key} in {self.path}")
         return self.map_grids.read(key)
 
     @property
-    def shelves(self) -> tuple[BranchShelf | GridShelf[Any], ...]:
+    def shelves(self) -> tuple[Shelf[Any], ...]:
         """The answers that are arrays in a directory each."""
         return (self.branches, self.boundary_grids, self.map_grids)
 
-    def set_answer_aside(self, shelf: BranchShelf | GridShelf[Any], key: str) -> Path:
+    def set_answer_aside(self, shelf: Shelf[Any], key: str) -> Path:
         """Take the files of a branch, a boundary or a map out of the store, and keep them.
 
         Parameters
         ----------
-        shelf : BranchShelf or GridShelf
+        shelf : Shelf
             One of `shelves`.
         key : str
             Of an answer there.

@@ -14,36 +14,40 @@ from pathlib import Path
 STAGING = "staging"
 WRITER_LOCK = "writer.lock"
 
-_NAME = re.compile(r"[0-9a-f]{32}")  # of directories that a store makes
+DIGITS = 32  # hexadecimal ones, of the names of most directories that a store makes
 
 
-def is_own_directory(path: Path) -> bool:
-    """Tell whether a path is a directory with a name as the store gives it: 32 hexadecimal digits.
+def is_own_directory(path: Path, digits: int = DIGITS) -> bool:
+    """Tell whether a path is a directory with a name as the store gives it: hexadecimal digits.
 
     Parameters
     ----------
     path : Path
-        An entry of `runs/`, of `staging/`, of a writer's directory or of `checkpoints/`.  Links do not count.
+        An entry of a directory of a store.  Links do not count.
+    digits : int
+        How many there are.
 
     Returns
     -------
     bool
     """
-    return is_own_name(path.name) and path.is_dir() and not path.is_symlink()
+    return is_own_name(path.name, digits) and path.is_dir() and not path.is_symlink()
 
 
-def is_own_name(name: str) -> bool:
-    """Tell whether a name is of the form that the store gives: 32 hexadecimal digits.
+def is_own_name(name: str, digits: int = DIGITS) -> bool:
+    """Tell whether a name is of the form that the store gives: hexadecimal digits.
 
     Parameters
     ----------
     name : str
+    digits : int
+        How many there are.
 
     Returns
     -------
     bool
     """
-    return _NAME.fullmatch(name) is not None
+    return re.fullmatch(rf"[0-9a-f]{{{digits}}}", name) is not None
 
 
 def abandoned(staging: Path) -> Iterator[Path]:

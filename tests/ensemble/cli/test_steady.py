@@ -118,9 +118,9 @@ def test_a_damaged_branch_is_noticed(followed, tmp_path):
         chunk.write_bytes(chunk.read_bytes()[:-1] + b"?")
     with Store.existing(copy) as opened:
         assert any(document["key"] in problem for problem in opened.check())
-        opened.branches.summary(document["key"])
+        opened.branches.read(document["key"])
         with pytest.raises(StoreError):
-            opened.branches.summary("0" * 32)
+            opened.branches.read("0" * 32)
 
 
 def test_a_damaged_branch_is_left_out_and_set_aside(followed, tmp_path):

@@ -113,3 +113,14 @@ def test_boundaries_come_back_with_a_rebuilt_catalog(path: Path) -> None:
         assert store.boundaries() == [BOUNDARY]
         assert store.check() == []
     assert repair(path) == []
+
+
+def test_folders_that_are_not_the_stores_are_left_alone(path: Path) -> None:
+    foreign = [path / folder / "notes" for folder in ("maps", "boundaries", "branches")]
+    for folder in foreign:
+        folder.mkdir(parents=True)
+    with Store.open(path) as store:
+        assert store.check() == []
+        assert {record.key for record in store.maps()} == {RECORD.key, OTHER.key}
+    repair(path)
+    assert all(folder.is_dir() for folder in foreign)
