@@ -163,6 +163,26 @@ def replacing(path: Path) -> Iterator[Path]:
         unfinished.unlink(missing_ok=True)
 
 
+def write_durably(path: Path, contents: bytes | memoryview) -> None:
+    """Write a file, or replace it in one step; it is durable when this returns.
+
+    Parameters
+    ----------
+    path : Path
+        See `replacing`.
+    contents : bytes-like
+
+    Raises
+    ------
+    OSError
+        If it cannot be written.  An earlier file is then unchanged.
+    """
+    with replacing(path) as unfinished:
+        unfinished.write_bytes(contents)
+        flush(unfinished)
+    flush(path.parent)
+
+
 def _digest(name: str) -> str:
     return sha256(os.fsencode(name)).hexdigest()[:8]
 

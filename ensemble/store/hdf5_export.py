@@ -9,7 +9,7 @@ from pathlib import Path
 
 import h5netcdf
 
-from ensemble.disk import flush, replacing
+from ensemble.disk import write_durably
 from ensemble.store.run_record import NamedArray, RunSummary
 
 
@@ -47,7 +47,4 @@ def write_netcdf(summary: RunSummary, arrays: Mapping[str, NamedArray], path: Pa
             variable.attrs.update(array.attributes)
         for name, value in summary.document().items():
             file.attrs[name] = json.dumps(value)
-    with replacing(path) as unfinished:
-        unfinished.write_bytes(image.getbuffer())
-        flush(unfinished)
-    flush(path.parent)
+    write_durably(path, image.getbuffer())

@@ -13,7 +13,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from ensemble.disk import flush, replacing
+from ensemble.disk import write_durably
 from ensemble.store.run_record import NamedArray, RunSummary
 from solver.analysis.run import Array
 
@@ -51,10 +51,7 @@ def write_vtkhdf(summary: RunSummary, arrays: Mapping[str, NamedArray], path: Pa
         root.attrs["Version"] = _VERSION
         root.attrs.create("Type", b"PolyData", dtype=h5py.string_dtype("ascii", len(b"PolyData")))
         _write_states(root, {name: array for name, array in arrays.items() if _is_at_points(array)}, arrays)
-    with replacing(path) as unfinished:
-        unfinished.write_bytes(image.getbuffer())
-        flush(unfinished)
-    flush(path.parent)
+    write_durably(path, image.getbuffer())
 
 
 def _is_at_points(array: NamedArray) -> bool:
