@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from rich import box
 from rich.console import Group
 from rich.markup import escape
-from rich.table import Column, Table
+from rich.table import Table
 from rich.text import Text
 
 if TYPE_CHECKING:
@@ -138,7 +138,7 @@ def boundary_table(boundary: Boundary) -> Table:
     columns, measured = boundary_columns(boundary.points), boundary.measured()
     units = {name.replace("_", " "): each.unit for of_point in measured for name, each in of_point.items()}
     headings = [*columns, *(f"{name} ({unit})" for name, unit in units.items())]
-    table = Table(*map(_folded, headings), title=escape(boundary.name), **_LEAN)
+    table = Table(*headings, title=escape(boundary.name))
     for point, of_point in zip(boundary.points, measured, strict=True):
         values = {name.replace("_", " "): each.value for name, each in of_point.items()}
         table.add_row(*boundary_cells(point, columns), *(_range(values.get(name)) for name in units))
@@ -163,7 +163,7 @@ def fields_table(document: Mapping[str, Any], measured: Mapping[str, Measured] |
     -------
     Table
     """
-    table = Table(*map(_folded, ["", *([""] if not measured else ["", ""])]), show_header=False, **_LEAN)
+    table = Table(show_header=False)
     for name, value in _leaves(document):
         cells = [name, _number(value)]
         if measured:
@@ -194,9 +194,7 @@ def for_people(table: Table) -> RenderableType:
         if several and len(set(cells)) == 1:
             if cells[0] != _ABSENT:
                 common.append(f"{plain(column.header)}: {cells[0]}")
-        elif cells and set(cells) <= {_ABSENT}:
-            continue
-        else:
+        elif not table.show_header or set(cells) != {_ABSENT}:
             kept.append((column, cells))
     lean = Table(title=table.title, show_header=table.show_header, **_LEAN)
     for column, cells in kept:
@@ -243,12 +241,15 @@ def list_table(columns: Sequence[ListColumn], documents: Iterable[Mapping[str, A
     rows = [
         [list_cell(column.value(document))[: column.width] for column in columns] for document in documents
     ]
-    first, *others = (column.heading for column in columns)
-    table = Table(_whole(first), *map(_folded, others), **_LEAN)
+    table = Table(**_LEAN)
+    for number, column in enumerate(columns):
+        if number == 0:  # a key is there to be copied: other columns give way first
+            table.add_column(column.heading, no_wrap=True, overflow="ignore")
+        else:
+            width = _whole_width([row[number] for row in rows])
+            table.add_column(column.heading, overflow="fold", min_width=width)
     for row in rows:
         table.add_row(*map(escape, row))
-    for column, cells in zip(table.columns[1:], list(zip(*rows, strict=True))[1:], strict=False):
-        column.min_width = _whole_width(cells)
     return table
 
 
@@ -265,16 +266,6 @@ def list_cell(value: Any) -> str:
     str
     """
     return _number(value)
-
-
-def _folded(heading: str) -> Column:
-    # Nothing is cut: what does not fit goes on in the next line.
-    return Column(heading, overflow="fold")
-
-
-def _whole(heading: str) -> Column:
-    # A key is there to be copied: other columns give way first.
-    return Column(heading, no_wrap=True, overflow="ignore")
 
 
 def _leaves(document: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Any]]:

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from ensemble.config.figure_options import INCH, USUAL, FigureOptions
 from ensemble.disk import replacing
-from ensemble.figures.style import STYLE
+from ensemble.figures.style import STYLE, WIDTH
 
 # The metadata that hold the date of a file are left out, so that equal figures are equal files.
 _UNDATED = {".png": {}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
@@ -58,6 +58,21 @@ def save(figure: Figure, path: Path, options: FigureOptions = USUAL) -> None:
             ) from warning
     with replacing(path) as unfinished:
         unfinished.write_bytes(image.getbuffer())
+
+
+def width_of(options: FigureOptions) -> float:
+    """Return the width that a figure is made for.
+
+    Parameters
+    ----------
+    options : FigureOptions
+
+    Returns
+    -------
+    float
+        Inches.
+    """
+    return WIDTH if options.size is None else options.size[0] / INCH
 
 
 def suffix_among(path: Path, suffixes: Sequence[str]) -> str:

@@ -38,3 +38,22 @@ def draw_run(run: Run, output: Path, options: FigureOptions, on_progress: OnPict
     else:
         figure = run_figure(run) if options.size is None else fitted_run_figure(run, options.size)
         save(figure, output, options)
+
+
+def refuse_movie(output: Path, answer: str) -> None:
+    """Raise an error if a file is a movie, for an answer that can only be a figure.
+
+    Parameters
+    ----------
+    output : Path
+    answer : str
+        What the answer is, for the message: such as ``critical-hamaker is a boundary``.
+
+    Raises
+    ------
+    ValueError
+    """
+    from ensemble.figures.movie import MOVIE_SUFFIXES
+
+    if output.suffix.lower() in MOVIE_SUFFIXES:
+        raise ValueError(f"output: only a run can be a movie, {answer}, got {output.name!r}")

@@ -283,14 +283,7 @@ class _StoredMap(StoredAnswer):
 
     def draw(self, output: Path, options: FigureOptions, on_progress: OnPicture | None = None) -> None:
         """Draw the phase diagram."""
-        from ensemble.config.figure_options import INCH
-        from ensemble.figures import map_diagram, save
-        from ensemble.figures.movie import MOVIE_SUFFIXES
-        from ensemble.figures.style import WIDTH
+        from ensemble.figures import map_diagram, refuse_movie, save, width_of
 
-        if output.suffix.lower() in MOVIE_SUFFIXES:
-            raise ValueError(
-                f"output: only a run can be a movie, {self.record.name} is a map, got {output.name!r}"
-            )
-        width = WIDTH if options.size is None else options.size[0] / INCH
-        save(map_diagram(self.record, width), output, options)
+        refuse_movie(output, f"{self.record.name} is a map")
+        save(map_diagram(self.record, width_of(options)), output, options)

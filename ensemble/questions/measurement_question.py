@@ -6,7 +6,8 @@ import math
 import time as clock
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, reduce
+from operator import getitem
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple, Self
 
@@ -154,11 +155,10 @@ class MeasurementQuestion(Question[AdhesionMeasurement]):
             return str(json_document["failure"])
         measured = json_document.get("in_units", {})
 
-        def text(name: str) -> str:
-            each = measured.get(name, {"value": json_document.get(name), "unit": ""})
-            if name.startswith("plan.") and name not in measured:
-                each = {"value": json_document["plan"][name.removeprefix("plan.")], "unit": ""}
-            return f"{each['value']:.4g} {each['unit']}".rstrip()
+        def text(path: str) -> str:
+            bare = {"value": reduce(getitem, path.split("."), json_document), "unit": ""}
+            number: Mapping[str, Any] = measured.get(path, bare)
+            return f"{number['value']:.4g} {number['unit']}".rstrip()
 
         return (
             f"H = {text('hamaker')} ± {text('hamaker_error')}, "

@@ -322,20 +322,13 @@ class _StoredBoundary(StoredAnswer):
 
     def draw(self, output: Path, options: FigureOptions, on_progress: OnPicture | None = None) -> None:
         """Draw the phase diagram, with every run that is behind the boundary, or the surface."""
-        from ensemble.config.figure_options import INCH
-        from ensemble.figures import phase_diagram, save, surface_diagram
-        from ensemble.figures.movie import MOVIE_SUFFIXES
-        from ensemble.figures.style import WIDTH
+        from ensemble.figures import phase_diagram, refuse_movie, save, surface_diagram, width_of
 
-        if output.suffix.lower() in MOVIE_SUFFIXES:
-            raise ValueError(
-                f"output: only a run can be a movie, {self.boundary.name} is a boundary, got {output.name!r}"
-            )
-        width = WIDTH if options.size is None else options.size[0] / INCH
+        refuse_movie(output, f"{self.boundary.name} is a boundary")
         if len(self.boundary.swept) > 1:
-            figure = surface_diagram(self.boundary, width)
+            figure = surface_diagram(self.boundary, width_of(options))
         else:
-            figure = phase_diagram(self.boundary, self._runs(), width)
+            figure = phase_diagram(self.boundary, self._runs(), width_of(options))
         save(figure, output, options)
 
     def _runs(self) -> list[tuple[float, float, str]]:

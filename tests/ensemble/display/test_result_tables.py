@@ -78,7 +78,9 @@ def test_a_key_is_never_cut() -> None:
     key = 32 * "f"
     assert any(
         key in line
-        for line in shown(fields_table({"scene.criteria.separated_distance": 12.0, "run_key": key}))
+        for line in shown(
+            for_people(fields_table({"scene.criteria.separated_distance": 12.0, "run_key": key}))
+        )
     )
 
 
