@@ -122,6 +122,23 @@ def stated_dimension(cls: type, name: str) -> Dimension | None:
     return None
 
 
+def document_in_units(document: Mapping[str, Any], units: Units | None) -> dict[str, Any]:
+    """Return a document as if its scene had other units, or none.
+
+    Parameters
+    ----------
+    document : mapping
+        Of a question about a scene.
+    units : Units or None
+
+    Returns
+    -------
+    dict
+    """
+    scene = document["scene"] | {"units": None if units is None else units.model_dump(mode="json")}
+    return {**document, "scene": scene}
+
+
 def measured_fields(node: Any, document: Mapping[str, Any], units: Units | None) -> dict[str, Measured]:
     """Return the numbers of a document that have a dimension, with their units.
 

@@ -8,7 +8,13 @@ from typing import Annotated, Any, Self
 from pydantic import BaseModel, ConfigDict, Field
 
 from ensemble.config.dotted_paths import is_array
-from ensemble.config.measured import Measured, dimension_at, measured_document, measured_values
+from ensemble.config.measured import (
+    Measured,
+    dimension_at,
+    document_in_units,
+    measured_document,
+    measured_values,
+)
 from ensemble.timestamp import Timestamp
 from solver.dimensions import Dimension
 from solver.scene import Numerics, Scene, Units
@@ -206,8 +212,7 @@ class Boundary(BaseModel):
         -------
         Boundary
         """
-        scene = self.study["scene"] | {"units": None if units is None else units.model_dump(mode="json")}
-        return self.model_copy(update={"study": self.study | {"scene": scene}})
+        return self.model_copy(update={"study": document_in_units(self.study, units)})
 
     def measured(self) -> list[dict[str, Measured]]:
         """Return the parameters, critical values and brackets in the units of the scene.

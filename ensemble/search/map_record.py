@@ -8,7 +8,7 @@ from typing import Any, Final, Self
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
-from ensemble.config.measured import Measured, dimension_at, measured_values
+from ensemble.config.measured import Measured, dimension_at, document_in_units, measured_values
 from ensemble.config.outcome_map import OutcomeMap
 from ensemble.search.map_refinement import Labels, beside_changes
 from ensemble.timestamp import Timestamp
@@ -97,8 +97,7 @@ class MapRecord(BaseModel):
         -------
         MapRecord
         """
-        scene = self.map["scene"] | {"units": None if units is None else units.model_dump(mode="json")}
-        return self.model_copy(update={"map": self.map | {"scene": scene}})
+        return self.model_copy(update={"map": document_in_units(self.map, units)})
 
     def measured(self) -> dict[str, Measured]:
         """Return the values along the axes in the units of the scene.
