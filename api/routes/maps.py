@@ -73,12 +73,13 @@ class ListedMap(BaseModel):
         -------
         str
         """
-        first, second = record.question.axes
+        question = record.question  # checked again each time
+        first, second = question.axes
         return cls(
             key=record.key,
             name=record.name,
             parameters=(first.parameter, second.parameter),
-            label=record.question.label,
+            label=question.label,
             labels=record.labels,
             runs=len(record.runs),
             updated=record.updated,

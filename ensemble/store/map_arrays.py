@@ -30,14 +30,14 @@ def map_arrays(record: MapRecord) -> dict[str, NamedArray]:
         The two parameters by their paths, in the middles of the cells, and over both of them ``label``, whose
         attribute ``flag_meanings`` explains the numbers, and ``made``, 1 where a cell was run.
     """
-    axes = record.question.axes
+    axes, scene = record.question.axes, record.scene
     dimensions = tuple(axis.parameter for axis in axes)
     made = np.zeros(record.numbers.shape)
     for each in record.runs:
         made[each.cell] = 1.0
     coordinates = {
         axis.parameter: NamedArray(
-            (axis.parameter,), np.array(axis.values), parameter_attributes(record.scene, axis.parameter)
+            (axis.parameter,), np.array(axis.values), parameter_attributes(scene, axis.parameter)
         )
         for axis in axes
     }
