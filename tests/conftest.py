@@ -17,6 +17,7 @@ import hypothesis
 import pytest
 
 from tests import postgresql, slurm
+from tests.forked_commands import forked_commands
 from tests.processor_time import ProcessorTimes
 
 # Before anything imports NumPy: the tests run in several processes, whose threads would compete.
@@ -109,12 +110,22 @@ def launcher() -> Launcher:
 
 
 @pytest.fixture(scope="session")
-def ensemble() -> Callable[..., subprocess.CompletedProcess[str]]:
-    """Run a command in one process, without a launcher."""
+def ensemble() -> Iterator[Callable[..., subprocess.CompletedProcess[str]]]:
+    """Run a command in a process of its own, without a launcher.
+
+    It is started where it gets variables: libraries may read them when they are imported.  Else it is forked.
+    With a size, a command can write no file of more bytes.
+    """
 
     def run(
-        *arguments: str, cwd: Path | None = None, environment: Mapping[str, str] = {}
+        *arguments: str,
+        cwd: Path | None = None,
+        environment: Mapping[str, str] = {},
+        largest_file: int | None = None,
     ) -> subprocess.CompletedProcess[str]:
+        if not environment:
+            return forked.run(list(arguments), cwd, os.environ, largest_file)
+        assert largest_file is None
         return subprocess.run(
             [*ENSEMBLE, *arguments],
             env=os.environ | environment,
@@ -125,7 +136,8 @@ def ensemble() -> Callable[..., subprocess.CompletedProcess[str]]:
             check=False,
         )
 
-    return run
+    with forked_commands() as forked:
+        yield run
 
 
 @pytest.fixture(scope="session")

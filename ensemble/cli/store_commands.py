@@ -25,7 +25,6 @@ from ensemble.cli.options import (
 from ensemble.cli.printing import print_json, print_json_array, print_list, print_table
 from ensemble.config.defaults import DEFAULT_STORE, LISTED
 from ensemble.config.figure_options import USUAL, FigureOptions, parse_size
-from ensemble.config.validation import validated
 from ensemble.errors import refusing
 
 if TYPE_CHECKING:
@@ -154,6 +153,8 @@ def show(  # numpydoc ignore=PR01
 
 
 def _figure_options(given: dict[str, Any], output: Path | None) -> FigureOptions:
+    from ensemble.config.validation import validated
+
     if given and output is None:
         names = " and ".join("--" + name.replace("_", "-") for name in given)
         raise ValueError(f"{names} — needs --output, the file of a figure")

@@ -8,7 +8,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from solver.scene import Model
+from solver.model import Model
 
 _SIZE = re.compile(r"(\d+(?:\.\d*)?)\s*[x×]\s*(\d+(?:\.\d*)?)")
 INCH = 2.54  # centimeters

@@ -18,7 +18,6 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotSpec
 from matplotlib.quiver import Quiver
-from scipy.interpolate import Akima1DInterpolator
 
 from ensemble.config.figure_options import OnPicture
 from ensemble.disk import replacing
@@ -263,6 +262,8 @@ def _interpolant(time: Array, values: Array) -> Callable[[float], Array]:
     """Return values (frames, ...) as a function of time: cubic between frames, without overshooting."""
     if len(time) == 1:
         return lambda _: values[0]
+    from scipy.interpolate import Akima1DInterpolator  # every drawing asks this module what a movie is
+
     return Akima1DInterpolator(time, values, method="makima")
 
 

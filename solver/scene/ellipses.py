@@ -167,8 +167,7 @@ def distances(first: Ellipses, second: Ellipses) -> Array:
 def overlapping_pair(vesicles: tuple[Vesicle, ...]) -> tuple[int, int] | None:
     """Return the indices of the first two ellipses that touch or overlap.
 
-    Only neighbors are compared, found in a tree, so the work grows like the number of vesicles.  For most of
-    them a lower bound of the distance is enough.
+    Only neighbors are compared.  For most of them a lower bound of the distance is enough.
 
     Parameters
     ----------
@@ -181,16 +180,28 @@ def overlapping_pair(vesicles: tuple[Vesicle, ...]) -> tuple[int, int] | None:
     """
     if len(vesicles) < 2:
         return None
-    from scipy.spatial import cKDTree  # for the reason that `solver.membrane.shapes` gives
-
     ellipses = Ellipses.of(vesicles)
-    centers = np.stack([ellipses.center.real, ellipses.center.imag], axis=1)
-    pairs = cKDTree(centers).query_pairs(2 * float(ellipses.major.max()), output_type="ndarray")
+    pairs = _neighbors(ellipses.center, 2 * float(ellipses.major.max()))
     for bound in (_around, clearances, distances):
         if not len(pairs):
             return None
         pairs = pairs[bound(ellipses[pairs[:, 0]], ellipses[pairs[:, 1]]) <= 0]
     return None if not len(pairs) else tuple(int(index) for index in min(pairs.tolist()))  # type: ignore[return-value]
+
+
+def _neighbors(centers: ComplexArray, reach: float) -> NDArray[np.int64]:
+    """Return the pairs (k, 2) of centers that are near along one axis, that on which all spread most.
+
+    A tree would find fewer.  But every scene is checked, and to load one takes longer than to check a pair.
+    """
+    places = max(centers.real, centers.imag, key=np.ptp)
+    order = np.argsort(places, kind="stable")
+    sorted_places = places[order]
+    first = np.arange(len(places))
+    counts = np.searchsorted(sorted_places, sorted_places + reach, side="right") - first - 1
+    steps = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    nearer = np.repeat(first, counts)
+    return np.sort(order[np.stack([nearer, nearer + 1 + steps], axis=1)], axis=1)
 
 
 def _strips(first: Ellipses, second: Ellipses, count: int) -> tuple[Array, Array]:

@@ -9,6 +9,7 @@ import signal
 import socket
 import subprocess
 import threading
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,7 @@ from fastapi import APIRouter
 from api.auth import TokenScope
 from tests.api.processes import alive, wait_until
 from tests.api.servers import make_token, serving
-from tests.api.services import SERVE, service
+from tests.api.services import service
 
 SECONDS = 600
 SECONDS_TO_DIE = 60  # far less on a machine that has nothing else to do
@@ -117,21 +118,20 @@ def test_the_number_of_workers_is_an_option(store, workers):
         wait_until(lambda: len(server.children()) == workers)
 
 
-def refused(store: Path, *options: str) -> str:
+@pytest.fixture
+def refused(ensemble: Callable[..., subprocess.CompletedProcess[str]]) -> Callable[..., str]:
     """Return the message of a server that refuses to start."""
-    result = subprocess.run(
-        [*SERVE, "--port=0", f"--store={store}", *options],
-        capture_output=True,
-        text=True,
-        timeout=SECONDS,
-        check=False,
-    )
-    assert result.returncode == 2
-    assert len(result.stderr.strip().splitlines()) == 1, result.stderr
-    return result.stderr
+
+    def message(store: Path, *options: str) -> str:
+        result = ensemble("serve", "--port=0", f"--store={store}", *options)
+        assert result.returncode == 2
+        assert len(result.stderr.strip().splitlines()) == 1, result.stderr
+        return result.stderr
+
+    return message
 
 
-def test_another_address_needs_tokens(store):
+def test_another_address_needs_tokens(refused, store):
     message = refused(store, "--host=0.0.0.0")
     assert "0.0.0.0" in message
     assert "ensemble token create" in message
@@ -164,7 +164,7 @@ def test_every_loopback_address_serves_this_machine_without_tokens(store, host):
         assert "loopback" in named.json()["detail"]
 
 
-def test_settings_come_from_the_environment_and_are_checked(store, monkeypatch):
+def test_settings_come_from_the_environment_and_are_checked(refused, store, monkeypatch):
     monkeypatch.setenv("ENSEMBLE_MAXIMUM_RANKS", "none")
     assert "ENSEMBLE_MAXIMUM_RANKS" in refused(store)
     monkeypatch.setenv("ENSEMBLE_MAXIMUM_RANKS", "1")
@@ -177,7 +177,7 @@ def test_settings_come_from_the_environment_and_are_checked(store, monkeypatch):
         assert "at most 1" in answer.json()["detail"]
 
 
-def test_a_launcher_that_cannot_be_used_is_refused(store, monkeypatch):
+def test_a_launcher_that_cannot_be_used_is_refused(refused, store, monkeypatch):
     monkeypatch.setenv("ENSEMBLE_LAUNCHER", "rsh")
     assert "ENSEMBLE_LAUNCHER" in refused(store)
     monkeypatch.setenv("ENSEMBLE_LAUNCHER", "slurm")
@@ -185,7 +185,7 @@ def test_a_launcher_that_cannot_be_used_is_refused(store, monkeypatch):
     assert "sbatch" in refused(store)
 
 
-def test_a_directory_that_is_not_a_store_is_refused(tmp_path):
+def test_a_directory_that_is_not_a_store_is_refused(refused, tmp_path):
     directory = tmp_path / "precious"
     directory.mkdir()
     (directory / "data").write_text("precious")

@@ -19,7 +19,6 @@ from sqlalchemy import make_url
 ROOT = Path(__file__).parents[2]
 DEPLOY = ROOT / "deploy"
 UNITS = sorted(DEPLOY.glob("*.service"))
-ENSEMBLE = (sys.executable, "-m", "ensemble")
 SECONDS = 240
 MOST_EXPOSED = 30  # tenths, of the ten that `systemd-analyze security` counts to
 
@@ -54,11 +53,9 @@ def commands() -> Iterator[tuple[str, list[str]]]:
 
 
 @pytest.mark.parametrize(("file", "arguments"), list(commands()), ids=lambda value: str(value))
-def test_commands_and_their_options_exist(file: str, arguments: list[str]) -> None:
+def test_commands_and_their_options_exist(ensemble, file: str, arguments: list[str]) -> None:
     # An unknown command or option is refused before the help is printed.
-    result = subprocess.run(
-        [*ENSEMBLE, *arguments, "--help"], capture_output=True, text=True, timeout=SECONDS, check=False
-    )
+    result = ensemble(*arguments, "--help")
     assert result.returncode == 0, f"{file}: {result.stderr}"
 
 

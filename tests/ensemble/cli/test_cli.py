@@ -377,19 +377,13 @@ def test_show_draws_runs_and_boundaries(ensemble, finished_study, stored_run, tm
     assert not (tmp_path / "history.doc").exists()
 
 
-def test_show_makes_movies_of_runs_only(ensemble, finished_study, tmp_path_factory, tmp_path):
-    store, movie = tmp_path_factory.mktemp("still") / "store", tmp_path / "run.gif"
-    # A run that ends at its start has one state, which makes the shortest movie.
-    still = ensemble("run", *QUICK_SCENE, "--set=numerics.work_limit=1", f"--store={store}", "--json")
-    made = ensemble("show", json.loads(still.stdout)["run_key"], f"--store={store}", f"--output={movie}")
-    assert made.returncode == 0, made.stderr
-    assert movie.read_bytes().startswith(b"GIF8")
+def test_a_boundary_is_no_movie(ensemble, finished_study, tmp_path):
     refused = ensemble(
         "show", "critical-hamaker", f"--store={finished_study.store}", f"--output={tmp_path / 'diagram.mp4'}"
     )
     assert refused.returncode == 2
     assert "output: only a run can be a movie, critical-hamaker" in refused.stderr
-    assert list(tmp_path.iterdir()) == [movie]
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_show_and_export_refuse_what_the_store_does_not_have(ensemble, stored_run, tmp_path):

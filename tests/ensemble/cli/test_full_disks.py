@@ -6,7 +6,6 @@ The largest size of a file stands for a quota: both are told by the write that g
 from __future__ import annotations
 
 import os
-import resource
 import shutil
 import subprocess
 import sys
@@ -23,17 +22,6 @@ from tests.ensemble.runs import assert_same_run, shear_run
 from tests.full_disks import ENTRIES, ROOM, filled, small_disk
 
 RUN = shear_run()
-
-
-def limited(size: int, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """Run a command that can write no file of more than so many bytes."""
-    return subprocess.run(
-        [*ENSEMBLE, *arguments],
-        capture_output=True,
-        text=True,
-        check=False,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size)),
-    )
 
 
 @pytest.fixture
@@ -66,9 +54,9 @@ def key_of(store: Path) -> str:
 
 @pytest.mark.parametrize("command", [["run", "vesicle-shear"], ["report", "stability"]])
 def test_a_quota_that_is_used_up_is_known_before_anything_is_computed(
-    store: Path, command: list[str]
+    ensemble, store: Path, command: list[str]
 ) -> None:
-    result = limited(1 << 16, *command, f"--store={store}")
+    result = ensemble(*command, f"--store={store}", largest_file=1 << 16)
     assert result.returncode == 1
     (line,) = result.stderr.splitlines()
     assert "cannot be written to (File too large)" in line
@@ -133,7 +121,7 @@ def test_a_run_that_the_store_does_not_take_is_kept_elsewhere(store: Path, impat
         assert_same_run(opened.load(kept.name), run)
 
 
-def test_a_full_disk_while_a_run_is_stored(disk: Path, impatient: None) -> None:
+def test_a_full_disk_while_a_run_is_stored(ensemble, disk: Path, impatient: None) -> None:
     second = shear_run(seed=1, scene=shear_run().scene.model_copy(update={"horizon": 50.0}))
     with Store.open(disk / "store") as store:
         staged = store.stage(RUN)
@@ -144,10 +132,7 @@ def test_a_full_disk_while_a_run_is_stored(disk: Path, impatient: None) -> None:
                 store.save_boundary(boundary("a", 0.25, 1.0, NOON))
             with pytest.raises(StoreError, match=r"No space left on device.* is kept in") as refused:
                 store.stage(second)
-            result = subprocess.run(
-                [*ENSEMBLE, "run", "vesicle-shear", f"--store={store.path}"],
-                capture_output=True, text=True, check=False,
-            )  # fmt: skip
+            result = ensemble("run", "vesicle-shear", f"--store={store.path}")
             assert result.returncode == 1
             (line,) = result.stderr.splitlines()
             assert "No space left on device" in line
@@ -164,13 +149,13 @@ def test_a_full_disk_while_a_run_is_stored(disk: Path, impatient: None) -> None:
 
 
 @pytest.mark.parametrize("name", ["run.h5", "run.png", "diagram.svg", "diagram.pdf"])
-def test_a_quota_that_is_used_up_by_a_file(store: Path, tmp_path: Path, name: str) -> None:
+def test_a_quota_that_is_used_up_by_a_file(ensemble, store: Path, tmp_path: Path, name: str) -> None:
     output = tmp_path / "files" / name
     output.parent.mkdir()
     output.write_text("what was there")
     key = key_of(store) if name.startswith("run") else "critical-hamaker"
     command = ["export", key, str(output)] if name.endswith(".h5") else ["show", key, f"--output={output}"]
-    result = limited(1 << 10, *command, f"--store={store}")
+    result = ensemble(*command, f"--store={store}", largest_file=1 << 10)
     assert result.returncode == 1, result.stderr
     (line,) = result.stderr.splitlines()
     assert line.startswith("ensemble: ")
@@ -190,7 +175,7 @@ def test_output_that_goes_to_a_full_disk(store: Path, options: list[str]) -> Non
     assert "No space left on device" in line
 
 
-def test_what_a_killed_export_leaves_is_removed_by_the_next(store: Path, tmp_path: Path) -> None:
+def test_what_a_killed_export_leaves_is_removed_by_the_next(ensemble, store: Path, tmp_path: Path) -> None:
     killed = (
         "import os, signal; from ensemble.disk import replacing; from pathlib import Path; import sys\n"
         "with replacing(Path(sys.argv[1])) as file:\n"
@@ -204,9 +189,6 @@ def test_what_a_killed_export_leaves_is_removed_by_the_next(store: Path, tmp_pat
     subprocess.run([sys.executable, "-c", killed, str(output)], check=False)
     subprocess.run([sys.executable, "-c", killed, str(directory / "other.h5")], check=False)
     assert len(list(directory.iterdir())) == 3
-    result = subprocess.run(
-        [*ENSEMBLE, "export", key_of(store), str(output), f"--store={store}"], check=False
-    )
-    assert result.returncode == 0
+    assert ensemble("export", key_of(store), str(output), f"--store={store}").returncode == 0
     left = set(directory.iterdir()) - {output, mine}
     assert len(left) == 1  # of the other file

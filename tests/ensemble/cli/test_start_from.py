@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import subprocess
-import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import h5py
@@ -22,9 +22,14 @@ BEAN = np.column_stack(
 )
 
 
-def start_from(directory: Path, *arguments: str | Path) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "ensemble", "start-from", *map(str, arguments)]
-    return subprocess.run(command, cwd=directory, capture_output=True, text=True, check=False)
+@pytest.fixture(scope="module")
+def start_from(ensemble) -> Callable[..., subprocess.CompletedProcess[str]]:
+    """Run the command in a directory."""
+
+    def run(directory: Path, *arguments: str | Path) -> subprocess.CompletedProcess[str]:
+        return ensemble("start-from", *map(str, arguments), cwd=directory)
+
+    return run
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +41,7 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
         return directory, opened.save(simulate(scene))
 
 
-def test_a_scene_starts_from_a_stored_run(store: tuple[Path, str], tmp_path: Path) -> None:
+def test_a_scene_starts_from_a_stored_run(start_from, store: tuple[Path, str], tmp_path: Path) -> None:
     directory, key = store
     done = start_from(
         directory, key[:12], "--time=4.3", "--turn=90 deg", "--shift", "1", "2", "--set=flow.rate=0.25"
@@ -59,7 +64,7 @@ def test_a_scene_starts_from_a_stored_run(store: tuple[Path, str], tmp_path: Pat
     assert simulate(scene.model_copy(update={"horizon": 0.1})).failure is None
 
 
-def test_another_state_is_another_scene(store: tuple[Path, str], tmp_path: Path) -> None:
+def test_another_state_is_another_scene(start_from, store: tuple[Path, str], tmp_path: Path) -> None:
     keys = set()
     for number, time in enumerate((2, 2, 4)):
         document = tmp_path / f"{number}.toml"
@@ -69,7 +74,7 @@ def test_another_state_is_another_scene(store: tuple[Path, str], tmp_path: Path)
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".CSV", ".txt", ".npy", ".h5"])
-def test_a_vesicle_takes_its_shape_from_a_file(suffix: str, tmp_path: Path) -> None:
+def test_a_vesicle_takes_its_shape_from_a_file(start_from, suffix: str, tmp_path: Path) -> None:
     file = tmp_path / f"bean{suffix}"
     if suffix == ".npy":
         np.save(file, BEAN)
@@ -94,7 +99,7 @@ def test_a_vesicle_takes_its_shape_from_a_file(suffix: str, tmp_path: Path) -> N
     assert simulate(load_scene(document, ["horizon=0.2"])).failure is None
 
 
-def test_points_in_a_unit(tmp_path: Path) -> None:
+def test_points_in_a_unit(start_from, tmp_path: Path) -> None:
     np.save(tmp_path / "bean.npy", 10 * BEAN)
     scene = tmp_path / "units.toml"
     text = "horizon = 1.0\nvesicles = [{}]\n"
@@ -143,7 +148,9 @@ def test_points_in_a_unit(tmp_path: Path) -> None:
         (("bean.csv", "--scene=vesicle-shear", "--set=vesicles.reduced_area=0.5"), "reduced_area is 0.5"),
     ],
 )
-def test_bad_input_is_refused_in_a_line(arguments: tuple[str, ...], message: str, tmp_path: Path) -> None:
+def test_bad_input_is_refused_in_a_line(
+    start_from, arguments: tuple[str, ...], message: str, tmp_path: Path
+) -> None:
     np.savetxt(tmp_path / "bean.csv", BEAN, delimiter=",")
     np.savetxt(tmp_path / "huge.csv", 1e200 * BEAN, delimiter=",")
     (tmp_path / "words.csv").write_text("x,y\n1,2,3\n")
@@ -154,13 +161,13 @@ def test_bad_input_is_refused_in_a_line(arguments: tuple[str, ...], message: str
     assert "Warning" not in done.stderr
 
 
-def test_the_unit_of_points_is_none_of_a_run(store: tuple[Path, str]) -> None:
+def test_the_unit_of_points_is_none_of_a_run(start_from, store: tuple[Path, str]) -> None:
     done = start_from(store[0], store[1], "--unit=um")
     assert done.returncode == 2
     assert "--unit — is that of points in files" in done.stderr
 
 
-def test_it_is_said_that_a_protocol_begins_anew(store: tuple[Path, str]) -> None:
+def test_it_is_said_that_a_protocol_begins_anew(start_from, store: tuple[Path, str]) -> None:
     assert "protocol" not in start_from(store[0], store[1]).stderr
     done = start_from(
         store[0], store[1], '--set=protocol={kind = "ramp", start = 0.0, end = 1.0, duration = 4.0}'
@@ -169,7 +176,7 @@ def test_it_is_said_that_a_protocol_begins_anew(store: tuple[Path, str]) -> None
     assert "the protocol of the flow begins at time 0 of the new run" in done.stderr
 
 
-def test_a_time_that_the_run_does_not_have_is_refused(store: tuple[Path, str]) -> None:
+def test_a_time_that_the_run_does_not_have_is_refused(start_from, store: tuple[Path, str]) -> None:
     done = start_from(store[0], store[1], "--time=7")
     assert done.returncode == 2
     assert "time must be from 0 to 6" in done.stderr
