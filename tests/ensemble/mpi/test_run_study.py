@@ -27,6 +27,10 @@ def points(document: dict[str, Any]) -> list[tuple[Any, Any, Any, Any]]:
     ]
 
 
+# The first point of the quick study alone: its bracket does not depend on what else is searched for.
+FIRST = "--set=sweep.values=[0.5]"
+
+
 def made(store: Path) -> dict[str, str]:
     """Time of creation of every committed run."""
     with Store.existing(store) as opened:
@@ -45,9 +49,9 @@ def test_any_number_of_ranks_finds_the_same_brackets(
 
 def test_without_a_launcher_it_is_the_same_study(ensemble, bisect_command, finished_study, tmp_path):
     _, _, _, *arguments = bisect_command(tmp_path / "store")
-    result = ensemble(*arguments)
+    result = ensemble(*arguments, FIRST)
     assert result.returncode == 0, result.stderr
-    assert points(json.loads(result.stdout)) == points(finished_study.document)
+    assert points(json.loads(result.stdout)) == points(finished_study.document)[:1]
 
 
 def test_both_ranks_simulate(finished_study):
@@ -86,7 +90,8 @@ def test_a_killed_study_leaves_no_process_and_continues_to_the_same_brackets(
     launcher, bisect_command, finished_study, tmp_path, victim
 ):
     store = tmp_path / "store"
-    launched = launcher.start(2, bisect_command(store))
+    command = [*bisect_command(store), FIRST]
+    launched = launcher.start(2, command)
     family = []
     try:
         while not (store / "runs").is_dir() or len(list((store / "runs").iterdir())) < 2:
@@ -105,10 +110,10 @@ def test_a_killed_study_leaves_no_process_and_continues_to_the_same_brackets(
         launched.wait()
 
     kept = made(store)
-    assert 0 < len(kept) < len(made(finished_study.store)), "it was not killed in the middle"
-    result = launcher.run(2, bisect_command(store))
+    result = launcher.run(2, command)
     assert result.returncode == 0, result.stderr
-    assert points(json.loads(result.stdout)) == points(finished_study.document)
+    assert points(json.loads(result.stdout)) == points(finished_study.document)[:1]
+    assert 0 < len(kept) < len(made(store)), "it was not killed in the middle"
     assert kept.items() <= made(store).items(), "a committed run was made again"
     with Store.existing(store) as opened:
         assert opened.check() == []
