@@ -65,6 +65,21 @@ class GeometricGrid:
         """
         return _grid_value(index, self.points_per_decade)
 
+    def position(self, value: float) -> float:
+        """Return where a value lies on the grid.
+
+        Parameters
+        ----------
+        value : float
+            Positive.
+
+        Returns
+        -------
+        float
+            An index, with its fraction where the value lies between two values of the grid.
+        """
+        return self.points_per_decade * math.log10(value)
+
     def nearest(self, value: float) -> int:
         """Return the index of the grid value whose ratio to a value is closest to 1.
 
@@ -78,7 +93,7 @@ class GeometricGrid:
         int
             Index of the grid value.
         """
-        return round(self.points_per_decade * math.log10(value))
+        return round(self.position(value))
 
     def index(self, value: float) -> int:
         """Return the index of a value on the grid.

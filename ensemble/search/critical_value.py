@@ -240,12 +240,12 @@ class GridSearch:
             self._grid.value(high) if high in self._indices else None,
         )
 
-    def _guessed(self, guess: tuple[float, float]) -> tuple[int, int]:
-        """Return the indices nearest to the ends of a guess, which need not lie within the limits."""
+    def _guessed(self, guess: tuple[float, float]) -> tuple[float, float]:
+        """Return where the ends of a guess lie on the grid; they need not lie within the limits."""
         low, high = guess
         if not 0 < low <= high < math.inf:
             raise ValueError(f"guess: [{low}, {high}] — must be 0 < low <= high")
-        return self._grid.nearest(low), self._grid.nearest(high)
+        return self._grid.position(low), self._grid.position(high)
 
 
 class CriticalValueSearch(GridSearch):
@@ -298,7 +298,7 @@ class CriticalValueSearch(GridSearch):
         return self._try(index)
 
     def replace_guess(self, guess: tuple[float, float]) -> None:
-        """Replace the guess, as long as there are no answers.
+        """Replace the guess.
 
         Parameters
         ----------
@@ -308,10 +308,8 @@ class CriticalValueSearch(GridSearch):
         Raises
         ------
         ValueError
-            If there is an answer already, or the guess is not 0 < low <= high.
+            If the guess is not 0 < low <= high.
         """
-        if self._sides:
-            raise ValueError("a search that has answers takes no other guess")
         self._prior = self._prior_of(guess)
 
     def unneeded(self) -> frozenset[float]:

@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left, insort
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ensemble.config.study import Study
 
 Place = tuple[float, ...]  # the value of each swept parameter
 Bracket = tuple[float, float]
 
-# A guess extends beyond the line through known neighbors by this share of the line's change from the nearest
-# of them, because the boundary is curved, and by this many tolerances, because their brackets have a width.
-CURVATURE_MARGIN = 0.1
-BRACKET_MARGIN = 2.0
+# A curve through known points is off by what their brackets leave open, and by this share of how far it lies
+# from the simpler curve with a point less.
+CURVATURE_MARGIN = 0.05
 
-_NEIGHBORS = 2  # on either side along each parameter, from which a bracket is expected
+_POINTS = 3  # that a curve goes through, at most: a parabola
 
 
 class KnownBrackets:
@@ -71,7 +73,7 @@ class KnownBrackets:
     def _along(self, at: Place, axis: int) -> Iterator[Place]:
         line = self._lines.get((axis, _others(at, axis)), [])
         position = bisect_left(line, at[axis])
-        for value in line[max(0, position - _NEIGHBORS) : position + _NEIGHBORS]:
+        for value in line[max(0, position - _POINTS) : position + _POINTS]:
             yield _with(at, axis, value)
 
 
@@ -79,9 +81,10 @@ def expected_bracket(study: Study, at: Place, known: Mapping[Place, Bracket]) ->
     """Return where the critical value is expected, from the points of the boundary that are known.
 
     Along each parameter with two or more neighbors it is expected near the straight line through two of them,
-    one on either side if possible.  Between two parameters it is expected to change with one as it does at
-    the nearest known value of the other.  The narrowest of these expectations counts.  If there is none, the
-    boundary is expected to lie between constant and proportional to each parameter.
+    one on either side if possible, and near the parabola through a third one.  Between two parameters it is
+    expected to change with one as it does at the nearest known value of the other.  The narrowest of these
+    expectations counts.  If there is none, the boundary is expected to lie between constant and proportional
+    to each parameter.
 
     Parameters
     ----------
@@ -101,31 +104,45 @@ def expected_bracket(study: Study, at: Place, known: Mapping[Place, Bracket]) ->
         known = {guess.at: guess.bracket for guess in study.search.guesses} | dict(known)
     if not known or at in known:
         return known.get(at)
-    expected = [*_on_lines(study, at, known), *_across(study, at, known)]
+    expected = [*_on_curves(study, at, known), *_across(study, at, known)]
     if not expected:
         expected = [_spread(at, place, bracket) for place, bracket in known.items()]
     low, high = min(expected, key=lambda ends: ends[1] - ends[0])
     return _within_limits(study, low, high)
 
 
-def _on_lines(study: Study, at: Place, known: Mapping[Place, Bracket]) -> Iterator[Bracket]:
-    """Yield what straight lines through neighbors along one parameter lead to expect."""
+def _on_curves(study: Study, at: Place, known: Mapping[Place, Bracket]) -> Iterator[Bracket]:
+    """Yield what the straight line and the parabola through neighbors along one parameter lead to expect."""
     for axis, value in enumerate(at):
-        centers = {
-            place[axis]: (_center(bracket), _width(study, bracket))
+        line = {
+            place[axis]: bracket
             for place, bracket in known.items()
             if _others(place, axis) == _others(at, axis)
         }
-        if len(centers) < 2:
+        if len(line) < 2:
             continue
-        nearest, *others = sorted(centers, key=lambda each: abs(each - value))
+        nearest, *others = sorted(line, key=lambda each: abs(each - value))
         on_other_side = (each for each in others if (each - value) * (nearest - value) < 0)
         other = next(on_other_side, others[0])
-        center, width = centers[nearest]
-        change = (centers[other][0] - center) / (other - nearest) * (value - nearest)
-        middle = _within_limits(study, center + change, math.inf)[0]
-        margin = width * middle + CURVATURE_MARGIN * abs(change)
-        yield middle - margin, middle + margin
+        places = [nearest, other, *(each for each in others if each != other)]
+        centers = np.array([_center(line[place]) for place in places])
+        uncertainties = np.array([_uncertainty(study, line[place]) for place in places])
+        simpler = centers[0]
+        for count in range(2, min(len(places), _POINTS) + 1):
+            weights = _lagrange_weights(value, places[:count])
+            estimate = float(weights @ centers[:count])
+            middle = _within_limits(study, estimate, math.inf)[0]
+            margin = float(np.linalg.norm(weights * uncertainties[:count])) * middle
+            margin += CURVATURE_MARGIN * abs(estimate - simpler)
+            yield middle - margin, middle + margin
+            simpler = estimate
+
+
+def _lagrange_weights(at: float, nodes: Sequence[float]) -> NDArray[np.float64]:
+    """Return the weights of the values at nodes in the value of the polynomial through them."""
+    return np.array(
+        [math.prod((at - other) / (node - other) for other in nodes if other != node) for node in nodes]
+    )
 
 
 def _across(study: Study, at: Place, known: Mapping[Place, Bracket]) -> Iterator[Bracket]:
@@ -142,8 +159,8 @@ def _across(study: Study, at: Place, known: Mapping[Place, Bracket]) -> Iterator
             continue
         first, second, opposite = map(_center, (one, other, bracket))
         middle = first * second / opposite
-        width = max(_width(study, each) for each in (one, other, bracket))
-        margin = width * middle + abs(middle - (first + second - opposite))
+        uncertainty = math.hypot(*(_uncertainty(study, each) for each in (one, other, bracket)))
+        margin = uncertainty * middle + abs(middle - (first + second - opposite))
         yield middle - margin, middle + margin
 
 
@@ -160,9 +177,10 @@ def _center(bracket: Bracket) -> float:
     return math.sqrt(bracket[0] * bracket[1])
 
 
-def _width(study: Study, bracket: Bracket) -> float:
+def _uncertainty(study: Study, bracket: Bracket) -> float:
+    """Return the relative standard deviation of a critical value that may lie anywhere in a bracket."""
     low, high = bracket
-    return max(BRACKET_MARGIN * study.search.tolerance, (high - low) / (high + low))
+    return max(study.search.tolerance / 2, (high - low) / (high + low)) / math.sqrt(3)
 
 
 def _others(place: Place, axis: int) -> Place:

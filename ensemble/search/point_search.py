@@ -113,11 +113,6 @@ class PointSearch(Generic[SomeValueSearch]):
         return self._pending
 
     @property
-    def is_new(self) -> bool:
-        """Whether no answer is known and no task is handed out."""
-        return not self._answers and not self._pending
-
-    @property
     def runs(self) -> list[str]:
         """The keys of the runs that gave the answers, in the order of their values."""
         return [self._answers[value].key for value in sorted(self._answers)]

@@ -59,7 +59,7 @@ class StudyPlanner:
         self._open: set[Place] = set()
         self._unneeded: dict[Place, tuple[SearchRun, ...]] = {}
         self._documents: dict[Place, BoundaryPoint] = {}
-        self._converged = KnownBrackets()
+        self._brackets = KnownBrackets()
         for at in self._points:
             self._look_at(at)
 
@@ -70,7 +70,7 @@ class StudyPlanner:
             if entry != self._entries[at]:
                 continue
             point = self._points[at]
-            if point.is_new and (guess := expected_bracket(self._study, at, self._converged.near(at))):
+            if guess := expected_bracket(self._study, at, self._brackets.near(at)):
                 point.replace_guess(guess)
             task = point.next_task()
             # A point without a task has none until it gets another answer.
@@ -149,7 +149,7 @@ class StudyPlanner:
             self._unneeded[at] = unneeded
         else:
             self._unneeded.pop(at, None)
-        self._converged.note(at, point.converged_bracket)
+        self._brackets.note(at, point.searched_bracket)
         self._entries[at] += 1
         if again and at in self._open:
             heappush(self._queue, (point.urgency, self._order[at], self._entries[at], at))

@@ -60,11 +60,6 @@ class StudyPoint:
         self._confirmation = self._at_finer_numerics(Confirmation())
         self._certification: PointSearch[Certification] | None = None
 
-    @property
-    def is_new(self) -> bool:
-        """Whether no answer is known and no task is handed out."""
-        return self._search.is_new
-
     def replace_guess(self, guess: tuple[float, float]) -> None:
         """Say where the critical value is expected.
 
@@ -208,12 +203,16 @@ class StudyPoint:
         )
 
     @property
+    def searched_bracket(self) -> tuple[float, float] | None:
+        """The bracket of the search, if it has converged, confirmed or not: it leads to guesses elsewhere."""
+        search = self._search.search
+        low, high = search.bracket if search.status is SearchStatus.CONVERGED else (None, None)
+        return None if low is None or high is None else (low, high)
+
+    @property
     def converged_bracket(self) -> tuple[float, float] | None:
         """The bracket of the search, if it has converged and its ends are confirmed."""
-        search = self._search.search
-        converged = search.status is SearchStatus.CONVERGED and self._is_confirmed
-        low, high = search.bracket if converged else (None, None)
-        return None if low is None or high is None else (low, high)
+        return self.searched_bracket if self._is_confirmed else None
 
     def _certifying(self) -> PointSearch[Certification] | None:
         """Return the certification of a search that has converged, beginning it if it is new."""

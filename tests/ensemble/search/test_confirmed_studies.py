@@ -152,3 +152,17 @@ def test_the_finest_numerics_have_no_finer_ones_to_confirm_them() -> None:
     assert {run_key(task.scene) for task in made} == {
         key for p in planner.boundary().points for key in p.runs
     }
+
+
+def test_a_bracket_leads_to_guesses_before_its_ends_are_confirmed() -> None:
+    study = study_of("search.scan=0", "sweep.values=[0.5, 0.75, 1.0]", "search.tolerance=0.01")
+    planner, physics = StudyPlanner(study, unknown), SensitivePhysics()
+    confirming = []
+    while (task := planner.next_task()) is not None and task.at != (1.0,):
+        if is_finer(task):
+            confirming.append(task)
+        else:
+            planner.answer(task, physics(task))
+    assert {each.at for each in confirming} == {(0.5,), (0.75,)}
+    assert task is not None
+    assert task.value == pytest.approx(0.671, rel=0.01), "on the line through both"

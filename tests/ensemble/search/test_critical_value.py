@@ -290,7 +290,7 @@ def test_everything_useful_pending_leaves_nothing_to_ask() -> None:
     assert not search.done
 
 
-def test_another_guess_moves_the_first_value_until_there_is_an_answer() -> None:
+def test_another_guess_moves_the_next_value_and_forgets_no_answer() -> None:
     search = CriticalValueSearch(GRID, LIMITS)
     search.replace_guess((0.9, 1.1))
     value = search.ask()
@@ -299,8 +299,12 @@ def test_another_guess_moves_the_first_value_until_there_is_an_answer() -> None:
     search.replace_guess((2.9, 3.1))
     assert search.ask() == pytest.approx(3.0, rel=0.02)
     search.tell(value, Side.LOW)
-    with pytest.raises(ValueError, match="takes no other guess"):
-        search.replace_guess((0.9, 1.1))
+    search.replace_guess((0.2, 0.3))
+    below = search.ask()
+    assert below is not None
+    assert below > value, "what lies below it is known to be low"
+    search.replace_guess((1.5, 1.6))
+    assert search.ask() == pytest.approx(1.55, rel=0.02)
 
 
 def test_refusals_name_what_is_wrong() -> None:

@@ -11,11 +11,13 @@ from hypothesis import strategies as st
 from ensemble.config.documents import load_study
 from ensemble.search.critical_value import SearchStatus, Side
 from ensemble.search.known_brackets import Bracket, KnownBrackets, Place, expected_bracket
+from ensemble.search.point_search import SearchRun
 from ensemble.search.study_planner import StudyPlanner
 from ensemble.search.study_search import critical_value_search
 from ensemble.search.task_queue import RunAnswer
 from solver.analysis.run import Outcome
 from tests.ensemble.search.study_runs import trace
+from tests.ensemble.search.test_certified_studies import is_finer
 
 HAMAKER = load_study("critical-hamaker", ["search.scan=0"])
 GRID = HAMAKER.search.grid
@@ -89,6 +91,38 @@ def test_a_guess_from_neighbors_holds_a_linear_boundary(
     assert low <= min(boundary(at), limit) <= high
     assert high < 2 * low
     assert critical_value_search(HAMAKER, (low, high)).ask() is not None
+
+
+def test_a_third_neighbor_tells_how_the_boundary_bends() -> None:
+    def boundary(rate: float) -> float:
+        return 0.3 + 0.8 * rate - 0.2 * rate**2
+
+    fine = load_study("critical-hamaker", ["search.tolerance=0.0001"])
+    known = {(rate,): (boundary(rate), boundary(rate)) for rate in (0.25, 0.5, 0.75)}
+    low, high = expected_bracket(fine, (1.0,), known) or (0.0, 0.0)
+    assert low < boundary(1.0) < high < 1.01 * low
+    del known[0.25,]
+    low, high = expected_bracket(fine, (1.0,), known) or (0.0, 0.0)
+    assert not low < boundary(1.0) < high, "the straight line leads past it"
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_sweep_along_a_smooth_boundary_takes_three_runs_a_point(workers: int) -> None:
+    rates = [0.25 + 1.25 * number / 19 for number in range(20)]
+    study = load_study("critical-hamaker", ["search.scan=0", f"sweep.values={rates}"])
+
+    def physics(task: SearchRun) -> RunAnswer:
+        assert task.scene.adhesion is not None
+        critical = 0.697 * task.at[0] ** 0.935
+        outcome = Outcome.BOUND if task.scene.adhesion.hamaker > critical else Outcome.SEPARATED
+        return RunAnswer(outcome, sensitive=True)
+
+    planner = StudyPlanner(study, lambda key: None)
+    made = trace(planner, physics, workers)
+    assert {point.status for point in planner.boundary().points} == {"converged"}
+    confirming = sum(map(is_finer, made))
+    assert confirming == 2 * len(rates)
+    assert len(made) - confirming <= 3 * len(rates)
 
 
 def test_neighbors_on_both_sides_are_preferred_to_nearer_ones_on_one() -> None:

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ensemble.config.documents import load_study
+from ensemble.config.run_key import run_key
 from ensemble.config.study import Study
 from ensemble.display.result_tables import boundary_cells, boundary_columns
 from ensemble.search.point_search import SearchRun
@@ -84,6 +85,33 @@ def test_brackets_depend_neither_on_the_workers_nor_on_the_order_of_answers(
         assert high / low - 1 < study.search.tolerance
         assert point.status == "converged"
         assert point.outcomes == ("separated", "bound")
+
+
+guesses = st.dictionaries(
+    st.sampled_from([0.25, 0.5, 0.75, 1.5]),
+    st.tuples(st.floats(0.01, 20.0), st.floats(1.01, 50.0)),
+    max_size=4,
+).map(lambda all_: [f"{{at = {at}, bracket = [{low}, {low * ratio}]}}" for at, (low, ratio) in all_.items()])
+
+
+@pytest.mark.parametrize("scan", [0, 2])
+@settings(deadline=None, max_examples=12)
+@given(guesses=guesses, workers=st.integers(1, 9), data=st.data())
+def test_brackets_do_not_depend_on_guesses_right_or_wrong(
+    scan: int, guesses: list[str], workers: int, data: st.DataObject
+) -> None:
+    changes = ["sweep.values=[0.25, 0.75, 1.5]", "search.tolerance=0.01", f"search.scan={scan}"]
+    unguided, guided = (
+        StudyPlanner(load_study("critical-hamaker", [*changes, f"search.guesses=[{each}]"]), unknown)
+        for each in ("", ", ".join(guesses))
+    )
+    run_study(unguided, 1, lambda out: 0)
+    run_study(guided, workers, lambda out: data.draw(st.integers(0, out - 1)))
+    ours, theirs = (
+        [point.model_dump(exclude={"runs"}) for point in planner.boundary().points]
+        for planner in (guided, unguided)
+    )
+    assert ours == theirs
 
 
 @settings(deadline=None, max_examples=20)
@@ -233,3 +261,17 @@ def test_finished_searches_tell_the_later_ones_where_to_begin() -> None:
     points = [load_study("critical-hamaker", [*unguided, f"sweep.values=[{rate}]"]) for rate in rates]
     apart = sum(len(run_study(StudyPlanner(point, unknown), 1, lambda out: 0)) for point in points)
     assert together < 0.75 * apart
+
+
+def test_a_search_that_has_answers_begins_where_the_finished_ones_tell_it_to() -> None:
+    changes = ["search.guesses=[]", "search.scan=0"]
+    first = StudyPlanner(load_study("critical-hamaker", [*changes, "sweep.values=[0.5, 0.75, 1.0]"]), unknown)
+    made = [*run_study(first, 1, lambda out: 0)]
+    whole = load_study("critical-hamaker", [*changes, "sweep.values=[0.5, 0.75, 1.0, 1.25]"])
+    far = whole.search.grid.value(whole.search.grid.nearest(4.0))
+    scene = whole.scene_at((1.25,), far)
+    made.append(SearchRun(at=(1.25,), value=far, scene=scene, key=run_key(scene)))
+    known = {task.key: RunAnswer(outcome_of(task)) for task in made}
+    planner = StudyPlanner(whole, known.get, [(task.at, task.value) for task in made])
+    assert planner.known_answers == len(made)
+    assert len(run_study(planner, 1, lambda out: 0)) <= 3
