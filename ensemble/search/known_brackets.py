@@ -6,9 +6,7 @@ import math
 from bisect import bisect_left, insort
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
-
-import numpy as np
-from numpy.typing import NDArray
+from operator import mul
 
 from ensemble.config.study import Study
 
@@ -125,24 +123,22 @@ def _on_curves(study: Study, at: Place, known: Mapping[Place, Bracket]) -> Itera
         on_other_side = (each for each in others if (each - value) * (nearest - value) < 0)
         other = next(on_other_side, others[0])
         places = [nearest, other, *(each for each in others if each != other)]
-        centers = np.array([_center(line[place]) for place in places])
-        uncertainties = np.array([_uncertainty(study, line[place]) for place in places])
+        centers = [_center(line[place]) for place in places[:_POINTS]]
+        uncertainties = [_uncertainty(study, line[place]) for place in places[:_POINTS]]
         simpler = centers[0]
-        for count in range(2, min(len(places), _POINTS) + 1):
+        for count in range(2, len(centers) + 1):
             weights = _lagrange_weights(value, places[:count])
-            estimate = float(weights @ centers[:count])
+            estimate = sum(map(mul, weights, centers))
             middle = _within_limits(study, estimate, math.inf)[0]
-            margin = float(np.linalg.norm(weights * uncertainties[:count])) * middle
+            margin = math.hypot(*map(mul, weights, uncertainties)) * middle
             margin += CURVATURE_MARGIN * abs(estimate - simpler)
             yield middle - margin, middle + margin
             simpler = estimate
 
 
-def _lagrange_weights(at: float, nodes: Sequence[float]) -> NDArray[np.float64]:
+def _lagrange_weights(at: float, nodes: Sequence[float]) -> list[float]:
     """Return the weights of the values at nodes in the value of the polynomial through them."""
-    return np.array(
-        [math.prod((at - other) / (node - other) for other in nodes if other != node) for node in nodes]
-    )
+    return [math.prod((at - other) / (node - other) for other in nodes if other != node) for node in nodes]
 
 
 def _across(study: Study, at: Place, known: Mapping[Place, Bracket]) -> Iterator[Bracket]:
