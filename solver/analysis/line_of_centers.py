@@ -158,9 +158,7 @@ class LineOfCenters(RevolutionTracker):
         return np.asarray(angles + np.pi * np.round((near - angles) / np.pi))
 
     def _own_directions(self, state: Array) -> Array:
-        membranes = self.membranes
-        angle, center = membranes.tangent_angle(state), membranes.center(state)
-        return curve.inclination(curve.positions(angle, center, membranes.length))
+        return curve.inclination_by_angle(self.membranes.tangent_angle(state))
 
     def distance_of(self, state: Array) -> float:
         """Return the center distance in a state.

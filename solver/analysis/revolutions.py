@@ -243,9 +243,7 @@ class LongAxisTracker(RevolutionTracker):
     direction_period = np.pi
 
     def _direction(self, state: Array) -> float:
-        membranes = self.membranes
-        angle, center = membranes.tangent_angle(state), membranes.center(state)
-        return float(curve.inclination(curve.positions(angle, center, membranes.length))[0])
+        return float(curve.inclination_by_angle(self.membranes.tangent_angle(state))[0])
 
 
 def may_tumble(scene: Scene) -> bool:

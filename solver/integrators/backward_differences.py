@@ -13,6 +13,8 @@ from math import comb
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.compilation import compiled
+
 Array = NDArray[np.float64]
 
 MAX_ORDER = 5
@@ -36,6 +38,7 @@ def extended(table: Array, order: int, difference: Array) -> None:
         table[row] += table[row + 1]
 
 
+@compiled
 def newton_weights(order: int, factor: float) -> Array:
     """Return the weights of differences in the values at multiples of another step.
 
@@ -53,15 +56,24 @@ def newton_weights(order: int, factor: float) -> Array:
         Row j for the value j new steps back; the last column is the first term that a polynomial of this
         order leaves out.
     """
-    return np.array([_newton_weights(order + 1, -factor * value) for value in range(order + 1)])
-
-
-def _newton_weights(order: int, steps: float) -> list[float]:
-    """Return the weights of the differences up to an order in the value some steps later."""
-    weights = [1.0]
-    for row in range(order):
-        weights.append(weights[row] * (steps + row) / (row + 1))
+    weights = np.empty((order + 1, order + 2))
+    for value in range(order + 1):
+        weights[value, 0] = 1.0
+        for row in range(order + 1):
+            weights[value, row + 1] = weights[value, row] * (row - factor * value) / (row + 1)
     return weights
+
+
+@compiled
+def _value_at(table: Array, steps: float) -> Array:
+    """Return the value of the polynomial (k + 1, n) some steps after the latest one, (n,)."""
+    value = table[0].copy()
+    weight = 1.0
+    for row in range(1, table.shape[0]):
+        weight *= (steps + row - 1) / row
+        for j in range(value.size):
+            value[j] += weight * table[row, j]
+    return value
 
 
 def combined(weights: Array, table: Array) -> Array:
@@ -117,7 +129,6 @@ def interpolant(table: Array, order: int, time: float, size: float) -> Callable[
     rows, shape = table[: order + 1].reshape(order + 1, -1).copy(), table.shape[1:]
 
     def at(instant: float) -> Array:
-        weights = np.array(_newton_weights(order, (instant - time) / size))
-        return np.asarray(weights @ rows).reshape(shape)
+        return np.asarray(_value_at(rows, (instant - time) / size)).reshape(shape)
 
     return at

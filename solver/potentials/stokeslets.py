@@ -205,26 +205,22 @@ def distances(targets: Array, sources: Array, tangents: Array, spacing: float, o
         Written to.
     """
     widest_vectors()
-    source_x, source_y = sources[0], sources[1]
-    squares = np.empty(source_x.size)
-    # Numbers that are not negative are in the order of their bits.  The least one of integers, and where it
-    # is, are found by SIMD code; of floating-point numbers they are not.
-    bits, last = squares.view(np.int64), squares.size - 1
-    for i in range(targets.shape[1]):
-        xi, yi = targets[0, i], targets[1, i]
-        for j in range(squares.size):
-            dx, dy = xi - source_x[j], yi - source_y[j]
-            squares[j] = dx * dx + dy * dy
-        least = bits[0]
-        for j in range(squares.size):
-            least = min(least, bits[j])
-        at = last
-        for j in range(squares.size):
-            at = min(at, j if bits[j] == least else last)
-        nearest = squares[at]
-        along = abs((xi - source_x[at]) * tangents[0, at] + (yi - source_y[at]) * tangents[1, at])
+    # Rows in one piece of memory, and an inner loop over the targets: or there is no SIMD code.
+    target_x, target_y = np.ascontiguousarray(targets[0]), np.ascontiguousarray(targets[1])
+    squares, nearest = np.full(out.size, np.inf), np.zeros(out.size, dtype=np.int64)
+    for j in range(sources.shape[1]):
+        xj, yj = sources[0, j], sources[1, j]
+        for i in range(out.size):
+            dx, dy = target_x[i] - xj, target_y[i] - yj
+            square, least = dx * dx + dy * dy, squares[i]
+            squares[i] = square if square < least else least
+            nearest[i] = j if square < least else nearest[i]
+    for i in range(out.size):
+        at = nearest[i]
+        dx, dy = target_x[i] - sources[0, at], target_y[i] - sources[1, at]
+        along = abs(dx * tangents[0, at] + dy * tangents[1, at])
         inside = min(along, 0.5 * spacing)
-        out[i] = np.sqrt(max(nearest - along * along, 0.0) + (along - inside) ** 2)
+        out[i] = np.sqrt(max(squares[i] - along * along, 0.0) + (along - inside) ** 2)
 
 
 @compiled
