@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.analysis.run import Viscosity
+from solver.compilation import compiled
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -40,10 +41,22 @@ def stress(geometry: Geometry, density: Array, gradient: Array) -> float:
     float
         Over all membranes, images included.
     """
-    # Products with 0 are no sums of their own: in shear these are f_x y to the last bit.
-    velocity = (gradient @ geometry.points.reshape(2, -1)).reshape(geometry.points.shape)
-    moment = np.sum(density[0] * velocity[0] + density[1] * velocity[1], axis=1)
-    return float(-geometry.membranes.multiplicity * np.sum(moment * geometry.membranes.spacing))
+    membranes = geometry.membranes
+    return -membranes.multiplicity * float(_power(density, geometry.points, gradient, membranes.spacing))
+
+
+@compiled
+def _power(density: Array, points: Array, gradient: Array, spacing: Array) -> float:
+    """Compute ∫ f · D x ds over the vesicles."""
+    total = 0.0
+    for vesicle in range(spacing.size):
+        fx, fy, x, y = density[0, vesicle], density[1, vesicle], points[0, vesicle], points[1, vesicle]
+        own = 0.0
+        for j in range(x.size):
+            own += fx[j] * (gradient[0, 0] * x[j] + gradient[0, 1] * y[j])
+            own += fy[j] * (gradient[1, 0] * x[j] + gradient[1, 1] * y[j])
+        total += own * spacing[vesicle]
+    return total
 
 
 def membrane_stress(motion: Motion, gradient: Array) -> float:

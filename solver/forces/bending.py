@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.compilation import compiled
 from solver.membrane.spectral import differentiation
 
 if TYPE_CHECKING:
@@ -70,10 +71,25 @@ class Bending:
         -------
         float
         """
-        curvature_vector = geometry.arclength_derivative(geometry.tangents)
-        square = np.sum(curvature_vector**2, axis=(0, 2)) * geometry.membranes.spacing
         membranes = geometry.membranes
-        return float(0.5 * membranes.multiplicity * np.sum(membranes.bending_modulus * square))
+        energy = _energy(
+            geometry.arclength_derivative(geometry.tangents), membranes.bending_modulus, membranes.spacing
+        )
+        return membranes.multiplicity * float(energy)
+
+
+@compiled
+def _energy(curvature_vector: Array, bending_modulus: Array, spacing: Array) -> float:
+    """Compute ½κ∫curvature² ds over the vesicles from x_ss (2, M, N)."""
+    total = 0.0
+    for vesicle in range(spacing.size):
+        square = 0.0
+        for component in range(2):
+            own = curvature_vector[component, vesicle]
+            for j in range(own.size):
+                square += own[j] * own[j]
+        total += 0.5 * bending_modulus[vesicle] * spacing[vesicle] * square
+    return total
 
 
 class BendingOfCircles(Bending):

@@ -11,7 +11,7 @@ from solver.compilation import compiled
 from solver.membrane.products import multiply_both
 from solver.membrane.spectral import interpolation, interpolations
 from solver.potentials.refinement import MAXIMUM_FACTOR, Refinement, group_targets
-from solver.potentials.stokeslets import distances, pair_distances
+from solver.potentials.stokeslets import distances
 
 if TYPE_CHECKING:
     from solver.membrane.geometry import Geometry
@@ -143,26 +143,32 @@ def gap(geometry: Geometry, refinement: int = 4) -> float:
     membranes = geometry.membranes
     if membranes.multiplicity == 1:
         return _gap_of_many(geometry, refinement)
-    return _gap_to_image(geometry, refinement)
-
-
-def _gap_to_image(geometry: Geometry, refinement: int) -> float:
-    """Compute `gap` of a vesicle and its image."""
-    membranes = geometry.membranes
-    apart = np.empty((1, 2, membranes.points))
-    nearest = pair_distances(geometry.curve_points, geometry.curve_tangents, membranes.curve_spacing, apart)
-    # Points that are interpolated are at most half a spacing from one that is not.
-    near = np.repeat(apart[0, 1] <= nearest + 1, refinement)
+    # One vesicle: only a pair that a half turn leaves as it is has an image.
+    points, tangents = geometry.points[:, 0], geometry.tangents[:, 0]
     matrix = interpolation(membranes.points, refinement)
-    fine = np.empty((4, len(matrix)))
-    multiply_both(matrix, *geometry.points[:, 0], fine[0], fine[1])
-    multiply_both(matrix, *geometry.tangents[:, 0], fine[2], fine[3])
-    shifted = np.concatenate([near[refinement // 2 :], near[: refinement // 2]])
-    targets = np.ascontiguousarray(fine[:2, shifted])
-    gaps = np.empty(targets.shape[1])
-    np.negative(fine, out=fine)
-    distances(targets, fine[:2], fine[2:], membranes.spacing[0] / refinement, gaps)
-    return float(gaps.min())
+    return float(_gap_to_image(points, tangents, float(membranes.spacing[0]), matrix))
+
+
+@compiled
+def _gap_to_image(points: Array, tangents: Array, spacing: float, matrix: Array) -> float:
+    """Compute `gap` of a vesicle (2, N) and its image, with the matrix of interpolation (refinement·N, N)."""
+    count, fine_count = points.shape[1], matrix.shape[0]
+    refinement = fine_count // count
+    apart = np.empty(count)
+    distances(points, -points, -tangents, spacing, apart)
+    # Points that are interpolated are at most half a spacing from one that is not.
+    limit = apart.min() + spacing
+    fine = np.empty((4, fine_count))
+    multiply_both(matrix, points[0], points[1], fine[0], fine[1])
+    multiply_both(matrix, tangents[0], tangents[1], fine[2], fine[3])
+    targets, found = np.empty((2, fine_count)), 0
+    for k in range(fine_count):
+        if apart[(k + refinement // 2) // refinement % count] <= limit:
+            targets[0, found], targets[1, found] = fine[0, k], fine[1, k]
+            found += 1
+    gaps = np.empty(found)
+    distances(targets[:, :found], -fine[:2], -fine[2:], spacing / refinement, gaps)
+    return gaps.min()
 
 
 def _gap_of_many(geometry: Geometry, refinement: int) -> float:
