@@ -226,7 +226,7 @@ class DirectAdhesion:
         -------
         (2, M, N)
         """
-        density = np.zeros_like(geometry.points)
+        density = np.zeros(geometry.points.shape)
         shares, sums = self._sums(geometry, closeness)
         add_density(*sums, self._hamaker, density)
         return gather_points(shares, density)

@@ -175,7 +175,9 @@ def _group(
     target, source, factor = refinement.groups[g]
     rows = refinement.rows[refinement.starts[g] : refinement.starts[g + 1]]
     sources = refined_points(points, source, factor, refinement)
-    weights = np.full(sources.shape[1], spacing[source] / factor)
+    weights = np.empty(sources.shape[1])
+    for j in range(weights.size):
+        weights[j] = spacing[source] / factor
     return rows, selected_points(points, target, rows), sources, weights
 
 

@@ -5,6 +5,7 @@ Quasi-constant step size, with the NDF modification; the Jacobian is kept until 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -250,7 +251,7 @@ class BackwardDifferentiation(Remembering):
             rate = self._equation.rate(state)
         except ArithmeticError:
             return None
-        return Evaluation(state, rate) if np.all(np.isfinite(rate)) else None
+        return Evaluation(state, rate) if math.isfinite(rate @ rate) else None
 
     def _accept(self, solution: _Solution) -> None:
         """Enter the new state, and its error, into the tables."""
@@ -285,8 +286,7 @@ class BackwardDifferentiation(Remembering):
         weights = newton_weights(order, factor)
         if self._error:
             self._error.rescale(order, weights, table[order + 1])
-        values = weights[:, :-1] @ table[: order + 1]
-        table[: order + 1] = differences_of_values(order) @ values
+        table[: order + 1] = differences_of_values(order) @ weights[:, :-1] @ table[: order + 1]
         table[order + 1] *= factor ** (order + 1)
         self._size *= factor
         self._equal_steps = 0

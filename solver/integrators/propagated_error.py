@@ -205,9 +205,9 @@ class PropagatedError:
         left_out : (n,)
             ∇ᵏ⁺¹y of the state, in the old step size.
         """
-        values = combined(weights[:, :-1], self._table[: order + 1])
-        values -= weights[:, -1, None, None] * left_out[:, None] * self._signs()
-        self._table[: order + 1] = combined(differences_of_values(order), values)
+        matrix = differences_of_values(order) @ weights
+        self._table[: order + 1] = combined(matrix[:, :-1], self._table[: order + 1])
+        self._table[: order + 1] -= matrix[:, -1, None, None] * left_out[:, None] * self._signs()
 
     def interpolant(self, order: int, time: float, size: float) -> Callable[[float], Array]:
         """Return the error between steps; see `interpolant` of `backward_differences`.

@@ -87,7 +87,8 @@ def closure(tangents: Array) -> Array:
     (...)
         |∫(cos θ, sin θ) ds|/L.
     """
-    return np.asarray(np.linalg.norm(tangents.mean(axis=-1), axis=-1))
+    mean = tangents.mean(axis=-1)
+    return np.asarray(np.hypot(mean[..., 0], mean[..., 1]))
 
 
 def inclination(points: Array) -> Array:

@@ -154,21 +154,30 @@ def _gap_to_image(points: Array, tangents: Array, spacing: float, matrix: Array)
     """Compute `gap` of a vesicle (2, N) and its image, with the matrix of interpolation (refinement·N, N)."""
     count, fine_count = points.shape[1], matrix.shape[0]
     refinement = fine_count // count
-    apart = np.empty(count)
-    distances(points, -points, -tangents, spacing, apart)
-    # Points that are interpolated are at most half a spacing from one that is not.
-    limit = apart.min() + spacing
-    fine = np.empty((4, fine_count))
+    fine, image = np.empty((4, fine_count)), np.empty((4, fine_count))
     multiply_both(matrix, points[0], points[1], fine[0], fine[1])
     multiply_both(matrix, tangents[0], tangents[1], fine[2], fine[3])
+    for row in range(4):
+        for k in range(fine_count):
+            image[row, k] = -fine[row, k]
+    # Every refinement-th point is one of the given ones.
+    apart = np.empty(count)
+    distances(fine[:2, ::refinement], image[:2, ::refinement], image[2:, ::refinement], spacing, apart)
+    nearest = np.inf
+    for i in range(count):
+        nearest = min(nearest, apart[i])
+    # Points that are interpolated are at most half a spacing from one that is not.
     targets, found = np.empty((2, fine_count)), 0
     for k in range(fine_count):
-        if apart[(k + refinement // 2) // refinement % count] <= limit:
+        if apart[(k + refinement // 2) // refinement % count] <= nearest + spacing:
             targets[0, found], targets[1, found] = fine[0, k], fine[1, k]
             found += 1
     gaps = np.empty(found)
-    distances(targets[:, :found], -fine[:2], -fine[2:], spacing / refinement, gaps)
-    return gaps.min()
+    distances(targets[:, :found], image[:2], image[2:], spacing / refinement, gaps)
+    gap = np.inf
+    for k in range(found):
+        gap = min(gap, gaps[k])
+    return gap
 
 
 def _gap_of_many(geometry: Geometry, refinement: int) -> float:

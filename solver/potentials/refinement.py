@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.compilation import compiled
+from solver.membrane.products import multiply_both
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -214,8 +215,14 @@ def refined_points(points: Array, source: int, factor: int, refinement: Refineme
     -------
     (2, factor·n)
     """
-    coarse = np.ascontiguousarray(points[:, source])
-    return coarse if factor == 1 else np.dot(coarse, interpolation_to(refinement, factor).T)
+    x, y = points[0, source], points[1, source]
+    refined = np.empty((2, factor * x.size))
+    if factor == 1:
+        for j in range(x.size):
+            refined[0, j], refined[1, j] = x[j], y[j]
+    else:
+        multiply_both(interpolation_to(refinement, factor), x, y, refined[0], refined[1])
+    return refined
 
 
 @compiled

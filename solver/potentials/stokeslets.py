@@ -205,9 +205,12 @@ def distances(targets: Array, sources: Array, tangents: Array, spacing: float, o
         Written to.
     """
     widest_vectors()
-    # Rows in one piece of memory, and an inner loop over the targets: or there is no SIMD code.
-    target_x, target_y = np.ascontiguousarray(targets[0]), np.ascontiguousarray(targets[1])
-    squares, nearest = np.full(out.size, np.inf), np.zeros(out.size, dtype=np.int64)
+    # Targets in one piece of memory, and an inner loop over them: or there is no SIMD code.
+    target_x, target_y = np.empty(out.size), np.empty(out.size)
+    squares, nearest = np.empty(out.size), np.empty(out.size, dtype=np.int64)
+    for i in range(out.size):
+        target_x[i], target_y[i] = targets[0, i], targets[1, i]
+        squares[i], nearest[i] = np.inf, 0
     for j in range(sources.shape[1]):
         xj, yj = sources[0, j], sources[1, j]
         for i in range(out.size):
