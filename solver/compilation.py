@@ -62,9 +62,14 @@ def compiled(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     """
     if function is None:
         return lambda function: compiled(function, **options)
-    dispatcher = njit(nogil=True, error_model="numpy", fastmath=_FAST_MATH, forceinline=True, **options)(
-        function
-    )
+    dispatcher = njit(
+        nogil=True,
+        error_model="numpy",
+        fastmath=_FAST_MATH,
+        forceinline=True,
+        no_cfunc_wrapper=True,
+        **options,
+    )(function)
     try:
         files = _ToleratedCache(function)
     except RuntimeError as error:  # no directory can be written to
