@@ -1,30 +1,23 @@
 """Adhesion among many vesicles, all points of which act on all points of the others.
 
-Between vesicles that are far apart the trapezoid rule needs few points: every second one, farther still every
-fourth, and so on.  For targets near a vesicle the difference between the sums over its refined
-points and over its points is added.
+What is far away is summed over fewer points (`clustered_sources`).  For targets near a vesicle the difference
+between the sums over its refined points and over its points is added.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.compilation import compiled
 from solver.forces.adhesion import DirectAdhesion, Everywhere, gather_points, total_energy
+from solver.forces.clustered_sources import clusters_of
+from solver.forces.clustered_sums import add_clustered_density, add_clustered_stiffness, clustered_energy
 from solver.forces.pair_formulas import formula_and_parameters
-from solver.forces.pair_sums import (
-    add_density,
-    add_forces,
-    add_stiffness,
-    add_stiffnesses,
-    pair_energy,
-    summed_energy,
-)
+from solver.forces.pair_sums import add_density, add_stiffness, summed_energy
 from solver.potentials.refinement import sum_costs, within
+from solver.potentials.vesicle_tree import vesicle_tree
 
 if TYPE_CHECKING:
     from solver.membrane.geometry import Geometry, Membranes
@@ -34,7 +27,10 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-_FEWEST = 16  # points that stand for a vesicle
+# Measured: the points along a side, for each digit of accuracy, with which sums cost least, and the part of
+# the error that each of the many nodes is allowed.
+_ORDER_PER_DIGIT = 0.75
+_PART = 0.3
 
 
 class CoarsenedAdhesion:
@@ -54,7 +50,8 @@ class CoarsenedAdhesion:
         self._law = formula_and_parameters(potential)
         self._hamaker = potential.hamaker
         self._parallel = parallel
-        self._decay = -2 * float(np.log(accuracy))  # twice, as vesicles are no circles; measured
+        self._accuracy = accuracy
+        self._order = max(round(-_ORDER_PER_DIGIT * float(np.log10(accuracy))), 3)
 
     @property
     def reach(self) -> float:
@@ -78,9 +75,7 @@ class CoarsenedAdhesion:
         """
         shares, refined, plain = self._sums(geometry, neighbors)
         density = np.zeros_like(geometry.points)
-        for vesicle, rows, sources, weights in coarsened_sources(geometry, shares.own, self._decay):
-            targets = geometry.points[:, vesicle, rows]
-            add_forces(*self._law, targets, sources, weights, self._hamaker, density[:, vesicle, rows])
+        add_clustered_density(*self._everyone(geometry, self._accuracy, shares), self._hamaker, density)
         add_density(*refined, self._hamaker, density)
         add_density(*plain, -self._hamaker, density)
         return gather_points(shares, density)
@@ -103,9 +98,7 @@ class CoarsenedAdhesion:
         """
         shares, refined, plain = self._sums(geometry, neighbors)
         stiffness = np.zeros((3, *geometry.points.shape[1:]))
-        for vesicle, rows, sources, weights in coarsened_sources(geometry, shares.own, self._decay):
-            targets = geometry.points[:, vesicle, rows]
-            add_stiffnesses(*self._law, targets, sources, weights, self._hamaker, stiffness[:, vesicle, rows])
+        add_clustered_stiffness(*self._everyone(geometry, self._accuracy, shares), self._hamaker, stiffness)
         add_stiffness(*refined, self._hamaker, stiffness)
         add_stiffness(*plain, -self._hamaker, stiffness)
         return gather_points(shares, stiffness)
@@ -127,9 +120,8 @@ class CoarsenedAdhesion:
         """
         shares, refined, plain = self._sums(geometry, neighbors)
         energy = summed_energy(*refined) - summed_energy(*plain)
-        for vesicle, rows, sources, weights in coarsened_sources(geometry, shares.own, self._decay):
-            far = pair_energy(*self._law, geometry.points[:, vesicle, rows], sources, weights)
-            energy += 0.5 * geometry.membranes.spacing[vesicle] * far
+        # With the distance the energy falls off more slowly than the force.
+        energy += clustered_energy(*self._everyone(geometry, 0.1 * self._accuracy, shares))
         return total_energy(self._parallel, geometry, self._hamaker * energy)
 
     def sum_error(self, neighbors: Proximity) -> float:
@@ -171,6 +163,13 @@ class CoarsenedAdhesion:
             (points, spacing, unrefined, *self._law),
         )
 
+    def _everyone(self, geometry: Geometry, accuracy: float, shares: Shares) -> tuple[Any, ...]:
+        """Return the arguments of this rank's compiled sums over all vesicles."""
+        points, spacing = geometry.points, geometry.membranes.spacing
+        tree = vesicle_tree(geometry.centers, geometry.radii)
+        clusters = clusters_of(tree, points, spacing, self._order, _PART * accuracy)
+        return *self._law, clusters, points, spacing, shares.own.start, shares.own.stop
+
 
 def adhesion_of_many(
     potential: PairPotential, accuracy: float, membranes: Membranes, parallel: Parallel
@@ -194,68 +193,3 @@ def adhesion_of_many(
     if potential.cutoff is None:
         return CoarsenedAdhesion(potential, accuracy, parallel)
     return DirectAdhesion(potential, accuracy, membranes, parallel)
-
-
-def coarsened_sources(
-    geometry: Geometry, own: slice, decay: float
-) -> Iterator[tuple[int, slice, Array, Array]]:
-    """Iterate over the vesicles that have points in a range, with the points of others that act on them.
-
-    The sum over n points of a circle of radius R errs by (1 + d/R)^−n at the distance d from it.
-
-    Parameters
-    ----------
-    geometry : Geometry
-    own : slice
-        Of all M·N points.
-    decay : float
-        Minus the logarithm of the error allowed.
-
-    Yields
-    ------
-    vesicle : int
-    rows : slice
-        Those of its points that are in the range.
-    sources : (2, ·)
-        Points of the other vesicles.
-    weights : (·,)
-        Arclength that each source stands for.
-    """
-    points, centers, spacing = geometry.points, geometry.centers, geometry.membranes.spacing
-    size = points.shape[2]
-    sources, weights = np.empty((2, points[0].size)), np.empty(points[0].size)
-    for vesicle in range(own.start // size, -(-own.stop // size)):
-        used = _coarsen(points, spacing, centers, geometry.radii, vesicle, decay, sources, weights)
-        rows = slice(max(own.start - vesicle * size, 0), min(own.stop - vesicle * size, size))
-        yield vesicle, rows, np.ascontiguousarray(sources[:, :used]), weights[:used]
-
-
-@compiled
-def _coarsen(
-    points: Array,
-    spacing: Array,
-    centers: Array,
-    radii: Array,
-    target: int,
-    decay: float,
-    sources: Array,
-    weights: Array,
-) -> int:
-    """Write the points of others that act on a vesicle, and their weights; return how many these are."""
-    count, n = points.shape[1], points.shape[2]
-    used = 0
-    for source in range(count):
-        if source == target:
-            continue
-        dx, dy = centers[0, source] - centers[0, target], centers[1, source] - centers[1, target]
-        apart = np.sqrt(dx * dx + dy * dy) - radii[source] - radii[target]
-        decay_per_point = np.log1p(max(apart, 0.0) / radii[source])
-        step = 1
-        while n % (2 * step) == 0 and n >= _FEWEST * 2 * step and n * decay_per_point >= decay * 2 * step:
-            step *= 2
-        for i in range(0, n, step):
-            sources[0, used] = points[0, source, i]
-            sources[1, used] = points[1, source, i]
-            weights[used] = spacing[source] * step
-            used += 1
-    return used

@@ -7,11 +7,16 @@ widest vectors that the processor has.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.compilation import compiled, widest_vectors
 from solver.potentials.logarithm import LOGARITHM_UNIT, logarithm_and_reciprocal
+
+if TYPE_CHECKING:
+    from solver.potentials.vesicle_tree import NearVesicles
 
 Array = NDArray[np.float64]
 
@@ -60,3 +65,39 @@ def velocity(targets: Array, sources: Array, point_forces: Array) -> Array:
         result[0, i] = isotropic * isotropic_x + radial * radial_x
         result[1, i] = isotropic * isotropic_y + radial * radial_y
     return result
+
+
+@compiled
+def add_near_velocities(
+    points: Array, point_forces: Array, near: NearVesicles, first: int, out: Array
+) -> None:
+    """Add the velocity of some vesicles that the point forces on near ones cause.
+
+    Parameters
+    ----------
+    points : (2, M, n)
+    point_forces : (M, 2, n)
+    near : NearVesicles
+    first : int
+        Number of the first of the m vesicles that are targets.
+    out : (2, m, n)
+        Added to.
+    """
+    n = points.shape[2]
+    begin = 0
+    while begin < near.targets.size:
+        target, end = near.targets[begin], begin
+        while end < near.targets.size and near.targets[end] == target:
+            end += 1
+        sources, forces = np.empty((2, end - begin, n)), np.empty((2, end - begin, n))
+        for k in range(begin, end):
+            source = near.sources[k]
+            for component in range(2):
+                for i in range(n):
+                    sources[component, k - begin, i] = points[component, source, i]
+                    forces[component, k - begin, i] = point_forces[source, component, i]
+        part = velocity(
+            np.ascontiguousarray(points[:, target]), sources.reshape(2, -1), forces.reshape(2, -1)
+        )
+        out[:, target - first] += part
+        begin = end

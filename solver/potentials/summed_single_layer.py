@@ -3,8 +3,8 @@
 See `solver.potentials.single_layer` for its definition.
 
 Points act on points by the trapezoid rule, which is accurate between vesicles that are far apart: directly,
-or by series in the moments of a vesicle (`multipoles`).  The rule of Kress (2014) adds the same circulant
-matrix on every vesicle.  For targets near another vesicle the difference between a refined or close
+or by series in the moments of a group of vesicles (`multipoles`).  The rule of Kress (2014) adds the same
+circulant matrix on every vesicle.  For targets near another vesicle the difference between a refined or close
 evaluation and the trapezoid rule is kept in small blocks as long as the geometry stays.
 """
 
@@ -18,12 +18,20 @@ from numpy.typing import NDArray
 from solver.compilation import compiled
 from solver.membrane.spectral import differentiation
 from solver.potentials.close_evaluation import close_stokeslets, logarithm_correction
-from solver.potentials.multipoles import LARGEST_ORDER, orders_between, write_coefficients
-from solver.potentials.multipoles import velocity as summed_velocity
+from solver.potentials.direct_sum import add_near_velocities
+from solver.potentials.multipoles import (
+    LARGEST_OF_GROUP,
+    LARGEST_ORDER,
+    add_series,
+    add_velocities,
+    group_moments,
+    write_moments,
+)
 from solver.potentials.quadrature import required_ratio
 from solver.potentials.refinement import LARGEST_REFINED, Refinement, interpolation_to, refined_points, within
 from solver.potentials.single_layer import row_costs
 from solver.potentials.stokeslets import stokeslets
+from solver.potentials.vesicle_tree import FarNodes, interactions, vesicle_tree
 
 if TYPE_CHECKING:
     from solver.membrane.geometry import Geometry, Membranes
@@ -33,11 +41,12 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-# Measured, in Stokeslets: the cost of a series at one target and of each of its terms.  And how many
-# velocities are asked for after an assembly.
-_SERIES_COST = 2.8
-_TERM_COST = 0.3
+# Measured: the usual cost of a vesicle's velocity without blocks, in Stokeslets, and how many velocities are
+# asked for after an assembly.
+_VESICLE_COST = 3e4
 _VELOCITIES = 8
+
+_ALIKE = 4  # source orders that are summed together; measured
 
 
 @compiled
@@ -162,18 +171,21 @@ class SummedSingleLayer:
         membranes = geometry.membranes
         count, points = membranes.count, membranes.points
         refinement = neighbors.refinement(self.ratio)
-        orders = np.empty((count, count), dtype=np.int64)
-        orders_between(geometry.points, geometry.centers, geometry.radii, self._accuracy, orders)
+        tree = vesicle_tree(geometry.centers, geometry.radii)
 
         def costs() -> Array:
-            near = row_costs(refinement, count * points).reshape(count, points).sum(axis=1)
-            each = np.where(orders > 0, _SERIES_COST + _TERM_COST * orders, points)
-            return near + _VELOCITIES * points * each.sum(axis=1)
+            blocks = row_costs(refinement, count * points).reshape(count, points).sum(axis=1)
+            return blocks + _VELOCITIES * _VESICLE_COST
 
         self.shares = self._parallel.divide(count, costs)
         own = self.shares.own
+        far, self._near = interactions(
+            tree, self._accuracy, LARGEST_ORDER, LARGEST_OF_GROUP, own.start, own.stop
+        )
+        alike = np.lexsort((far.target_orders, far.source_orders // _ALIKE))
+        self._far = FarNodes(*(part[alike] for part in far))
         self._geometry = geometry
-        self._orders = orders[own]
+        self._tree = tree
         refinement = within(refinement, slice(own.start * points, own.stop * points), count * points)
         group = np.repeat(np.arange(len(refinement.groups)), np.diff(refinement.starts))
         self._sources = refinement.groups[group, 1]
@@ -203,23 +215,18 @@ class SummedSingleLayer:
         -------
         (2, m, N)
         """
-        geometry, own = self._geometry, self.shares.own
-        _, count, points = own_forces.shape
-        sent = np.empty((count, 2 * points + 6 * (LARGEST_ORDER + 1)))
-        forces, coefficients = _parts(sent, points)
-        forces[:] = own_forces.swapaxes(0, 1)
-        write_coefficients(geometry.points, geometry.centers, own.start, own_forces, coefficients)
-        forces, coefficients = map(np.ascontiguousarray, _parts(self.shares.gather(sent), points))
+        geometry, tree, first = self._geometry, self._tree, self.shares.own.start
+        circles = geometry.points, geometry.centers, geometry.radii, first
+        own_moments = np.empty((own_forces.shape[1], 4, LARGEST_ORDER + 1))
+        write_moments(*circles, own_forces, own_moments)
+        moments = self.shares.gather(own_moments)
+        forces = self.shares.gather(np.ascontiguousarray(own_forces.swapaxes(0, 1)))
         velocity = own_forces @ self._correction
-        summed_velocity(
-            geometry.points, forces, geometry.centers, coefficients, self._orders, own.start, velocity
-        )
+        series, orders = np.zeros_like(own_moments), np.zeros(len(own_moments), dtype=np.int64)
+        of_groups = group_moments(tree, moments, LARGEST_OF_GROUP)
+        add_series(tree, self._far, first, moments, of_groups, series, orders)
+        add_velocities(*circles, series, orders, velocity)
+        add_near_velocities(geometry.points, forces, self._near, first, velocity)
         _add_blocks(self._blocks, self._targets, self._sources, forces, velocity)
-        _add_own(geometry.tangents, self._lengths, own.start, own_forces, velocity)
+        _add_own(geometry.tangents, self._lengths, first, own_forces, velocity)
         return velocity
-
-
-def _parts(rows: Array, points: int) -> tuple[Array, Array]:
-    """Return views of what ranks exchange about m vesicles: point forces and coefficients of series."""
-    forces, coefficients = rows[:, : 2 * points], rows[:, 2 * points :]
-    return forces.reshape(-1, 2, points), coefficients.reshape(-1, 6, LARGEST_ORDER + 1)

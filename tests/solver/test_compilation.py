@@ -36,22 +36,23 @@ twice(1.0)
 print(twice.stats.cache_hits.total())
 """
 
-# The velocity of one vesicle that 39 others cause, in part by series, which are too long to be inlined unless
-# they have to be.
+# The velocity of one vesicle: of others by a sum over points, which is too long to be inlined unless it has to
+# be, and by a series.
 SERIES_SOURCE = """
 import hashlib, sys
 import numpy as np
 from solver.potentials import direct_sum, multipoles
+from solver.potentials.vesicle_tree import NearVesicles
 
 random = np.random.default_rng(1)
 points, forces = random.standard_normal((2, 40, 64)), random.standard_normal((40, 2, 64))
-centers = np.stack([4.0 * np.arange(40), np.zeros(40)])
-points += centers[:, :, None]
-coefficients, velocity = random.standard_normal((40, 6, 64)), np.zeros((2, 1, 64))
-orders = np.array([[-1] + 19 * [0] + 20 * [12]])  # none of its own
+centers, radii = np.zeros((2, 40)), np.full(40, 4.0)
+series, velocity = random.standard_normal((1, 4, 33)), np.zeros((2, 1, 64))
+near = NearVesicles(np.zeros(19, dtype=np.int64), np.arange(19))
 if "directly" in sys.argv:
     direct_sum.velocity(points[:, 0].copy(), points[:, 1].copy(), forces[1])
-multipoles.velocity(points, forces, centers, coefficients, orders, 0, velocity)
+multipoles.add_velocities(points, centers, radii, 0, series, np.array([12]), velocity)
+direct_sum.add_near_velocities(points, forces, near, 0, velocity)
 assert np.isfinite(velocity).all()
 print(hashlib.sha256(velocity).hexdigest())
 """

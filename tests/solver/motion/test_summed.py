@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from solver.forces import coarsened_adhesion
 from solver.forces.adhesion import DirectAdhesion
-from solver.forces.coarsened_adhesion import CoarsenedAdhesion, coarsened_sources
+from solver.forces.coarsened_adhesion import CoarsenedAdhesion
 from solver.integrators import InitialValueProblem
 from solver.integrators.bdf import BackwardDifferentiation
 from solver.integrators.sdc import DeferredCorrection
@@ -20,8 +20,6 @@ from solver.motion.dense import DenseEquation
 from solver.motion.summed import SummedEquation
 from solver.motion.terms import dense_equation, equation_of_motion, summed_equation
 from solver.parallel import SERIAL
-from solver.potentials import multipoles
-from solver.potentials.direct_sum import velocity as direct_velocity
 from solver.potentials.neighbors import Neighbors, gap
 from solver.potentials.proximity import Closeness
 from solver.potentials.refinement import LARGEST_REFINED
@@ -157,24 +155,6 @@ def scattered(count: int, points: int) -> Geometry:
     return Geometry(Membranes.of_scene(scene), placed_state(scene))
 
 
-@pytest.mark.parametrize("accuracy", [1e-4, 1e-7, 1e-10])
-def test_series_give_the_sum_over_points_as_accurately_as_asked(accuracy: float) -> None:
-    geometry = scattered(25, 64)
-    forces = np.random.default_rng(0).standard_normal(geometry.points.shape)
-    flat = geometry.points.reshape(2, -1)
-    expected = direct_velocity(flat, flat, forces.reshape(2, -1)).reshape(forces.shape)
-    orders = np.empty((25, 25), dtype=np.int64)
-    multipoles.orders_between(geometry.points, geometry.centers, geometry.radii, accuracy, orders)
-    coefficients = np.empty((25, 6, multipoles.LARGEST_ORDER + 1))
-    multipoles.write_coefficients(geometry.points, geometry.centers, 0, forces, coefficients)
-    found = np.zeros_like(forces)
-    by_vesicle = np.ascontiguousarray(forces.swapaxes(0, 1))
-    multipoles.velocity(geometry.points, by_vesicle, geometry.centers, coefficients, orders, 0, found)
-    assert np.mean(orders > 0) > 0.5
-    assert np.all(np.diag(orders) == 0)
-    np.testing.assert_allclose(found, expected, rtol=0, atol=accuracy * np.max(np.abs(expected)))
-
-
 @pytest.mark.parametrize("accuracy", [1e-5, 1e-7, 1e-9])
 @pytest.mark.parametrize("exponents", [(4, 2), (5, 3)])
 def test_adhesion_between_far_vesicles_needs_few_of_their_points(
@@ -185,9 +165,6 @@ def test_adhesion_between_far_vesicles_needs_few_of_their_points(
     near, everyone = Neighbors(geometry, 8.0), Closeness(geometry)
     sums = CoarsenedAdhesion(potential, accuracy, SERIAL)
     exact = DirectAdhesion(potential, 1e-12, geometry.membranes)
-    decay = -2 * float(np.log(accuracy))
-    coarsened = coarsened_sources(geometry, slice(0, 16 * 64), decay)
-    assert all(weights.size < 15 * 64 for *_, weights in coarsened)
     expected = exact.density(geometry, everyone)
     allowed = 10 * accuracy * np.max(np.abs(expected))
     np.testing.assert_allclose(sums.density(geometry, near), expected, rtol=0, atol=allowed)

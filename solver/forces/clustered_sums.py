@@ -1,0 +1,197 @@
+"""Sums of a pair potential over all other vesicles, most of them by the few points that stand for them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.compilation import compiled
+from solver.forces.clustered_sources import (
+    Clusters,
+    SourceLists,
+    chebyshev_points,
+    interpolate,
+    write_sources,
+)
+from solver.forces.pair_sums import add_forces, add_stiffnesses, pair_energy
+
+if TYPE_CHECKING:
+    from solver.forces.pair_formulas import PairFormula
+
+Array = NDArray[np.float64]
+
+
+@compiled
+def add_clustered_density(
+    formula: PairFormula,
+    parameters: Any,
+    clusters: Clusters,
+    points: Array,
+    spacing: Array,
+    first: int,
+    last: int,
+    hamaker: float,
+    density: Array,
+) -> None:
+    """Add the force per length of all other vesicles at some points.
+
+    Parameters
+    ----------
+    formula : PairFormula
+    parameters : tuple
+        Of `formula_and_parameters`.
+    clusters : Clusters
+    points : (2, M, N)
+    spacing : (M,)
+    first, last : int
+        The range of points, counted through all vesicles.
+    hamaker : float
+    density : (2, M, N)
+        Added to.
+    """
+    lists = _lists(clusters, points)
+    for vesicle, begin, end in _parts(points, first, last):
+        near, far = write_sources(formula, parameters, clusters, points, spacing, vesicle, lists)
+        targets, out = _rows(points, vesicle, begin, end), np.zeros((2, end - begin))
+        grid, values = (
+            chebyshev_points(clusters.tree, vesicle, clusters.nodes),
+            np.zeros((2, clusters.nodes.size**2)),
+        )
+        sources, weights = _taken(lists.near, near)
+        add_forces(formula, parameters, targets, sources, weights, hamaker, out)
+        sources, weights = _taken(lists.far, far)
+        add_forces(formula, parameters, grid, sources, weights, hamaker, values)
+        _add_interpolated(clusters, vesicle, values, targets, out)
+        density[:, vesicle, begin:end] += out
+
+
+@compiled
+def add_clustered_stiffness(
+    formula: PairFormula,
+    parameters: Any,
+    clusters: Clusters,
+    points: Array,
+    spacing: Array,
+    first: int,
+    last: int,
+    hamaker: float,
+    stiffness: Array,
+) -> None:
+    """Add the derivative of `add_clustered_density` at each point by that point.
+
+    Parameters
+    ----------
+    formula : PairFormula
+    parameters : tuple
+        Of `formula_and_parameters`.
+    clusters : Clusters
+    points : (2, M, N)
+    spacing : (M,)
+    first, last : int
+        The range of points, counted through all vesicles.
+    hamaker : float
+    stiffness : (3, M, N)
+        Added to.
+    """
+    lists = _lists(clusters, points)
+    for vesicle, begin, end in _parts(points, first, last):
+        near, far = write_sources(formula, parameters, clusters, points, spacing, vesicle, lists)
+        targets, out = _rows(points, vesicle, begin, end), np.zeros((3, end - begin))
+        grid, values = (
+            chebyshev_points(clusters.tree, vesicle, clusters.nodes),
+            np.zeros((3, clusters.nodes.size**2)),
+        )
+        sources, weights = _taken(lists.near, near)
+        add_stiffnesses(formula, parameters, targets, sources, weights, hamaker, out)
+        sources, weights = _taken(lists.far, far)
+        add_stiffnesses(formula, parameters, grid, sources, weights, hamaker, values)
+        _add_interpolated(clusters, vesicle, values, targets, out)
+        stiffness[:, vesicle, begin:end] += out
+
+
+@compiled
+def clustered_energy(
+    formula: PairFormula,
+    parameters: Any,
+    clusters: Clusters,
+    points: Array,
+    spacing: Array,
+    first: int,
+    last: int,
+) -> float:
+    """Compute ½∫∫ φ/H ds ds over some points and all other vesicles.
+
+    Parameters
+    ----------
+    formula : PairFormula
+    parameters : tuple
+        Of `formula_and_parameters`.
+    clusters : Clusters
+    points : (2, M, N)
+    spacing : (M,)
+    first, last : int
+        The range of points, counted through all vesicles.
+
+    Returns
+    -------
+    float
+    """
+    lists, total = _lists(clusters, points), 0.0
+    for vesicle, begin, end in _parts(points, first, last):
+        near, far = write_sources(formula, parameters, clusters, points, spacing, vesicle, lists)
+        targets = _rows(points, vesicle, begin, end)
+        sources, weights = _taken(lists.near, near)
+        energy = pair_energy(formula, parameters, targets, sources, weights)
+        sources, weights = _taken(lists.far, far)
+        energy += pair_energy(formula, parameters, targets, sources, weights)
+        total += 0.5 * spacing[vesicle] * energy
+    return total
+
+
+@compiled
+def _lists(clusters: Clusters, points: Array) -> SourceLists:
+    """Make lists with room for all points, and as many for groups as there can be."""
+    size = points.shape[1] * max(points.shape[2], clusters.nodes.size**2)
+    return SourceLists(np.empty((3, size)), np.empty((3, size)))
+
+
+@compiled
+def _parts(points: Array, first: int, last: int) -> list[tuple[int, int, int]]:
+    """Return the vesicles that have points in a range, and the ranges of their points in it."""
+    n = points.shape[2]
+    return [
+        (vesicle, max(first - vesicle * n, 0), min(last - vesicle * n, n))
+        for vesicle in range(first // n, -(-last // n))
+    ]
+
+
+@compiled
+def _taken(sources: Array, count: int) -> tuple[Array, Array]:
+    """Return points (2, count) and weights of a list as arrays that loops become SIMD code for."""
+    return np.ascontiguousarray(sources[:2, :count]), np.ascontiguousarray(sources[2, :count])
+
+
+@compiled
+def _rows(points: Array, vesicle: int, begin: int, end: int) -> Array:
+    """Return some of the points of a vesicle, (2, end − begin)."""
+    return np.ascontiguousarray(points[:, vesicle, begin:end])
+
+
+@compiled
+def _add_interpolated(clusters: Clusters, vesicle: int, values: Array, targets: Array, out: Array) -> None:
+    """Add values (c, p²) at Chebyshev points about a vesicle, interpolated to targets (2, t) in its box."""
+    tree, order = clusters.tree, clusters.nodes.size
+    along, across = np.empty(order), np.empty(order)
+    for i in range(targets.shape[1]):
+        x = (targets[0, i] - tree.centers[0, vesicle]) / tree.extents[0, vesicle]
+        y = (targets[1, i] - tree.centers[1, vesicle]) / tree.extents[1, vesicle]
+        interpolate(x, clusters.nodes, clusters.scales, along)
+        interpolate(y, clusters.nodes, clusters.scales, across)
+        for component in range(out.shape[0]):
+            total = 0.0
+            for a in range(order):
+                for b in range(order):
+                    total += along[a] * across[b] * values[component, a * order + b]
+            out[component, i] += total
