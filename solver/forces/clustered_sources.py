@@ -2,7 +2,7 @@
 
 A smooth function in a box is its interpolant through p × p Chebyshev points.  So the sum over a group of
 vesicles that is far away is one over such points, with the weights that make the sums over the vesicles'
-points of all interpolated functions the same (Wang, Tlupova & Krasny 2020).  In the same way the force of
+points of all interpolated functions the same (Wang, Krasny & Tlupova 2020).  In the same way the force of
 what is far away is computed at p × p points about a vesicle and interpolated to its own.  A single vesicle
 far away is every second, fourth, … of its points.
 

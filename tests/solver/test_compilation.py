@@ -36,7 +36,7 @@ twice(1.0)
 print(twice.stats.cache_hits.total())
 """
 
-# The velocity of one vesicle: of others by a sum over points, which is too long to be inlined unless it has to
+# The velocity of one vesicle: of others by a sum over points, which is too long to be inlined unless it must
 # be, and by a series.
 SERIES_SOURCE = """
 import hashlib, sys

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -25,17 +24,14 @@ from ensemble.report.scaling.scaling_document import (
 )
 from ensemble.report.scaling.scaling_figures import scaling_figures
 from ensemble.report.scaling.scaling_fit import (
-    fast_summation_seconds,
     fit_model,
     predict_efficiencies,
     recommend_ranks,
-    summation_crossover,
 )
 from ensemble.report.scaling.scaling_measurements import (
     EvaluationMeasurement,
     measure_collectives,
     measure_evaluation,
-    measure_pair_seconds,
     peak_memory,
 )
 from ensemble.report.scaling.scaling_plan import FULL, POINTS, QUICK, ScalingPlan
@@ -127,7 +123,6 @@ def measure_scaling(communicator: Intracomm, plan: ScalingPlan, log: Callable[[s
         return None
     model = fit_model(costs, evaluations, collectives)
     evaluations = [_with_prediction(model, evaluation) for evaluation in evaluations]
-    crossover = summation_crossover(model, costs, measure_pair_seconds())
     return Scaling(
         machine=Machine.here(),
         ranks=communicator.Get_size(),
@@ -142,13 +137,7 @@ def measure_scaling(communicator: Intracomm, plan: ScalingPlan, log: Callable[[s
         ),
         predictions=predict_efficiencies(model),
         recommendations=recommend_ranks(model),
-        costs=[
-            cost.model_copy(
-                update={"with_fast_summation": fast_summation_seconds(model, crossover, cost.vesicles)}
-            )
-            for cost in costs
-        ],
-        crossover=crossover,
+        costs=costs,
         groups=[],
     )
 
@@ -191,7 +180,6 @@ def _measure_costs(
                     seconds=measurement.seconds,
                     sums=measurement.sums,
                     peak_memory_bytes=peak_memory(),
-                    with_fast_summation=None,
                 )
             )
     return costs
@@ -229,8 +217,8 @@ def _measure_weak(
 ) -> list[WeakScaling]:
     measured: list[WeakScaling] = []
     for ranks in sizes:
-        vesicles = round(plan.weak * math.sqrt(ranks))
-        log(f"{vesicles} vesicles, ranks: {ranks}, as many pairs on each as on one")
+        vesicles = plan.weak * ranks
+        log(f"{vesicles} vesicles, ranks: {ranks}, as many on each as on one")
         measurement = measure_evaluation(communicator, vesicles, ranks, plan.repeats)
         if measurement is not None:
             on_one_rank = measured[0].seconds if measured else measurement.seconds

@@ -42,7 +42,7 @@ class SharedEvaluation(ReportModel):
 
 
 class WeakScaling(ReportModel):
-    """An evaluation in which each rank has as many pairs of points as one rank alone.
+    """An evaluation in which each rank has as many vesicles as one rank alone.
 
     Attributes
     ----------
@@ -91,15 +91,17 @@ class EvaluationCost(ReportModel):
         How often it sums the velocities of all points from all points.
     peak_memory_bytes : int
         Largest memory of the process up to now.
-    with_fast_summation : float or None
-        Predicted time with a fast multipole method.
     """
 
     vesicles: int
     seconds: float
     sums: float
     peak_memory_bytes: int
-    with_fast_summation: float | None
+
+    @property
+    def seconds_a_vesicle(self) -> float:
+        """Time of the evaluation over the number of vesicles."""
+        return self.seconds / self.vesicles
 
 
 class EfficiencyPrediction(ReportModel):
@@ -129,35 +131,6 @@ class RankRecommendation(ReportModel):
 
     vesicles: int
     ranks: int
-
-
-class SummationCrossover(ReportModel):
-    """The number of vesicles beyond which a fast multipole method would be faster.
-
-    It is compared with series of whole vesicles and sums over their near points.
-
-    Attributes
-    ----------
-    terms : int
-        Terms of its expansions.
-    pairs_a_point : float
-        Its cost for each point, in pairs of the direct sum.
-    pair_seconds : float
-        Time of one pair of the direct sum.
-    point_seconds : float
-        Time of all its sums in an evaluation, for each point.
-    vesicles : int or None
-        None where the measured times do not grow like the number of pairs.
-    assumption : str
-        The source of the cost, and what is assumed.
-    """
-
-    terms: int
-    pairs_a_point: float
-    pair_seconds: float
-    point_seconds: float
-    vesicles: int | None
-    assumption: str
 
 
 class GroupsUse(ReportModel):
@@ -222,8 +195,6 @@ class Scaling(ReportModel):
         By number of vesicles.
     costs : list of EvaluationCost
         By number of vesicles.
-    crossover : SummationCrossover
-        Where a fast multipole method would be faster.
     groups : list of GroupsUse
         By number of groups; empty if the store has too few runs to take their times from.
     """
@@ -241,5 +212,4 @@ class Scaling(ReportModel):
     predictions: list[EfficiencyPrediction]
     recommendations: list[RankRecommendation]
     costs: list[EvaluationCost]
-    crossover: SummationCrossover
     groups: list[GroupsUse]

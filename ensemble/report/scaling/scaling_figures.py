@@ -6,7 +6,7 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from ensemble.figures.style import BLACK, BLUE, GRAY, GREEN, ORANGE, PURPLE, SKY, STYLE, VERMILLION, WIDTH
+from ensemble.figures.style import BLACK, BLUE, GRAY, GREEN, ORANGE, PURPLE, STYLE, VERMILLION, WIDTH
 from ensemble.report.scaling.scaling_document import Scaling
 from ensemble.report.scaling.time_shares import PARTS
 
@@ -77,14 +77,9 @@ def _cost(report: Scaling) -> Figure:
     time, memory = figure.subplots(1, 2)
     vesicles = [cost.vesicles for cost in report.costs]
     time.plot(vesicles, [cost.seconds for cost in report.costs], "o", color=BLACK, label="measured")
-    crossover = report.crossover.vesicles
-    between = np.geomspace(vesicles[0], max(vesicles[-1], 2 * (crossover or 0)), 100)
+    between = np.geomspace(vesicles[0], vesicles[-1], 100)
     model = [report.model.seconds(report.points * number, 1) for number in between]
     time.plot(between, model, color=BLUE, label="model")
-    fast = [cost.with_fast_summation or np.nan for cost in report.costs]
-    time.plot(vesicles, fast, color=VERMILLION, linestyle="-.", label="with fast summation")
-    if crossover:
-        time.axvline(crossover, color=SKY, linestyle=":", label="crossover")
     time.set(xscale="log", yscale="log", xlabel="vesicles", ylabel="seconds an evaluation, 1 rank")
     time.legend(loc="upper left")
     peaks = [cost.peak_memory_bytes / 2**20 for cost in report.costs]

@@ -15,23 +15,12 @@ from ensemble.report.scaling.scaling_document import (
     EvaluationCost,
     RankRecommendation,
     SharedEvaluation,
-    SummationCrossover,
 )
 from ensemble.report.scaling.scaling_plan import POINTS
 from solver.scene import LARGEST_DENSE
 
 _RANKS = (10, 32, 100, 316, 1_000, 3_162, 10_000)
 _VESICLES = (2, 16, 64, 256, 1_024, 10_000)
-
-_TERMS = 24  # of an expansion: an error of about 2^−p = 1e-7, that of sums at the default tolerance
-_SUMS = 3  # of harmonic potentials, which together make the velocity of a Stokeslet
-ASSUMPTION = (
-    "Greengard and Rokhlin, J. Comput. Phys. 73, 325 (1987): with s points in a box and p terms, each point "
-    "sums over 9s neighbors, and its share of the 27 translations of its box costs 27p²/s; s = √3·p is "
-    f"best.  Assumed: p = {_TERMS} (an error of about 2^−p), {_SUMS} harmonic sums for the velocity of a "
-    "Stokeslet, a multiplication in a translation as expensive as a pair of the direct sum, and adhesion "
-    "summed as fast."
-)
 
 
 def fit_model(
@@ -61,7 +50,7 @@ def fit_model(
     shared = [evaluation for evaluation in evaluations if evaluation.vesicles > LARGEST_DENSE]
     latency, bandwidth = _latency_and_bandwidth(collectives)
     exchanging = ScalingModel(
-        pair=0.0,
+        level=0.0,
         point=0.0,
         repeated=0.0,
         fixed=0.0,
@@ -78,10 +67,14 @@ def fit_model(
     points = POINTS * vesicles
     exchanged = [exchanging.seconds(POINTS * count, ranks_of_one) for count, ranks_of_one, _ in times]
     several = np.any(ranks > 1)
-    terms = np.stack([points**2 / ranks, points / ranks * several, points, np.ones_like(points)], axis=1)
+    terms = np.stack(
+        [points * np.log2(points) / ranks, points / ranks * several, points, np.ones_like(points)], axis=1
+    )
     computed = np.maximum(seconds - exchanged, 0.0)
-    pair, point, repeated, fixed = nnls(terms / seconds[:, None], computed / seconds)[0]
-    return exchanging.model_copy(update={"pair": pair, "point": point, "repeated": repeated, "fixed": fixed})
+    level, point, repeated, fixed = nnls(terms / seconds[:, None], computed / seconds)[0]
+    return exchanging.model_copy(
+        update={"level": level, "point": point, "repeated": repeated, "fixed": fixed}
+    )
 
 
 def _latency_and_bandwidth(collectives: Sequence[CollectiveTime]) -> tuple[float, float]:
@@ -135,57 +128,3 @@ def recommend_ranks(model: ScalingModel) -> list[RankRecommendation]:
         RankRecommendation(vesicles=vesicles, ranks=model.recommended_ranks(POINTS * vesicles, _RANKS[-1]))
         for vesicles in _VESICLES
     ]
-
-
-def summation_crossover(
-    model: ScalingModel, costs: Sequence[EvaluationCost], pair_seconds: float
-) -> SummationCrossover:
-    """Estimate where a fast multipole method begins to be faster; `ASSUMPTION` states its cost.
-
-    Parameters
-    ----------
-    model : ScalingModel
-        The model.
-    costs : sequence of EvaluationCost
-        Costs on one rank.
-    pair_seconds : float
-        Time of one pair of points in the direct sum.
-
-    Returns
-    -------
-    SummationCrossover
-        The estimate.
-    """
-    points_in_a_box = math.sqrt(3) * _TERMS
-    pairs = _SUMS * (9 * points_in_a_box + 27 * _TERMS**2 / points_in_a_box)
-    sums = float(np.mean([cost.sums for cost in costs if cost.vesicles > LARGEST_DENSE]))
-    point_seconds = sums * pairs * pair_seconds
-    return SummationCrossover(
-        terms=_TERMS,
-        pairs_a_point=pairs,
-        pair_seconds=pair_seconds,
-        point_seconds=point_seconds,
-        vesicles=math.ceil(point_seconds / model.pair / POINTS) if model.pair > 0 else None,
-        assumption=ASSUMPTION,
-    )
-
-
-def fast_summation_seconds(model: ScalingModel, crossover: SummationCrossover, vesicles: int) -> float:
-    """Return the time of an evaluation on one rank that sums by a fast multipole method.
-
-    Parameters
-    ----------
-    model : ScalingModel
-        The model.
-    crossover : SummationCrossover
-        Has the cost of the fast multipole method.
-    vesicles : int
-        Number of vesicles.
-
-    Returns
-    -------
-    float
-        Seconds.
-    """
-    each = crossover.point_seconds + model.point + model.repeated
-    return each * POINTS * vesicles + model.fixed

@@ -17,7 +17,6 @@ from ensemble.report.scaling.scaling_plan import suspension
 from ensemble.report.scaling.time_shares import time_shares
 from solver.motion.terms import equation_of_motion
 from solver.parallel import SERIAL, Array
-from solver.potentials.direct_sum import velocity
 from solver.simulation.initial_state import placed_state
 
 if TYPE_CHECKING:
@@ -28,8 +27,6 @@ _ACROSS = np.array([0.0, 1e-3])  # velocity
 _SIZES = tuple(8 * 8**power for power in range(7))  # bytes on each rank, 8 to 2 million
 _MANY = 200  # collectives of the smallest size in one measurement
 _MEBIBYTE = 1 << 20
-_POINTS = 1024  # of the direct sum that is timed
-_MEASUREMENTS = 20
 
 
 class EvaluationMeasurement(NamedTuple):
@@ -160,19 +157,6 @@ def _gather_seconds(group: Intracomm, size: int) -> float:
     for _ in range(repeats):
         group.Allgatherv(part, [whole, counts])
     return (time.perf_counter() - begin) / repeats
-
-
-def measure_pair_seconds() -> float:
-    """Return the time of one pair of points in the direct sum, the least of several measurements."""
-    random = np.random.default_rng(0)
-    targets, sources, forces = random.standard_normal((3, 2, _POINTS))
-    velocity(targets, sources, forces)
-    seconds = []
-    for _ in range(_MEASUREMENTS):
-        begin = time.perf_counter()
-        velocity(targets, sources, forces)
-        seconds.append(time.perf_counter() - begin)
-    return min(seconds) / _POINTS**2
 
 
 def peak_memory() -> int:

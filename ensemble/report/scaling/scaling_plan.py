@@ -21,7 +21,7 @@ class ScalingPlan:
     single : tuple of int
         Measured on one rank, for cost and memory; ascending.
     weak : int
-        Measured on one rank, and √G times as many on G ranks, so that each rank has the same pairs.
+        Measured on one rank, and G times as many on G ranks.
     repeats : int
         How often each evaluation is repeated.
     groups : tuple of (int, float)
@@ -43,8 +43,8 @@ QUICK = ScalingPlan(
     groups=((16, 1.0), (256, 1.0), (256, 100.0)),
 )
 FULL = ScalingPlan(
-    shared=(2, 16, 64, 256),
-    single=(2, 8, 16, 32, 64, 128, 256, 512, 1024),
+    shared=(2, 16, 64, 256, 1024),
+    single=(2, 8, 16, 32, 64, 128, 256, 512, 1024, 2048, 4096),
     weak=64,
     repeats=12,
     groups=(*QUICK.groups, (4096, 100.0)),

@@ -29,7 +29,7 @@ _COST = {
     "seconds": "seconds",
     "sums over all points": "sums",
     "peak memory (bytes)": "peak_memory_bytes",
-    "seconds with fast summation (model)": "with_fast_summation",
+    "seconds a vesicle": "seconds_a_vesicle",
 }
 _GROUPS = {
     "groups": "groups",
@@ -57,14 +57,14 @@ def scaling_conclusions(report: Scaling) -> list[str]:
     list of str
         A sentence each.
     """
-    crossover, most = report.crossover, max(report.evaluations, key=lambda row: (row.vesicles, row.ranks))
-    pays = f"beyond {crossover.vesicles} vesicles" if crossover.vesicles else "for no number measured"
+    most = max(report.evaluations, key=lambda row: (row.vesicles, row.ranks))
+    largest = report.costs[-1]
     worth = ", ".join(f"{row.ranks} for {row.vesicles} vesicles" for row in report.recommendations[-3:])
     return [
         f"{most.vesicles} vesicles: {most.seconds:.2g} s an evaluation on {most.ranks} ranks, an efficiency "
         f"of {most.efficiency:.0%}.",
         f"Ranks that are worth it (the model is {LEAST_EFFICIENCY:.0%} efficient): {worth}.",
-        f"Fast summation would pay {pays}.",
+        f"{largest.vesicles} vesicles on one rank: {largest.seconds_a_vesicle:.2g} s an evaluation for each.",
         f"The model's largest deviation from a measured time is {report.largest_misprediction:.0%}.",
         *(
             f"{row.groups} groups with runs of {row.run_seconds:.2g} s, simulated: {row.busy:.0%} busy, "
@@ -90,7 +90,7 @@ def scaling_text(report: Scaling, figures: Sequence[str]) -> str:
     str
         The text.
     """
-    model, crossover = report.model, report.crossover
+    model = report.model
     sections = [
         "# Scaling",
         bullets(scaling_conclusions(report)),
@@ -103,25 +103,22 @@ def scaling_text(report: Scaling, figures: Sequence[str]) -> str:
         "Shares of the time are those of the first rank, profiled; waiting for others counts as collectives.",
         table(_EVALUATION, report.evaluations),
         "## Weak scaling",
-        "As many pairs of points on each rank: the number of vesicles grows like the root of that of ranks.",
+        "As many vesicles on each rank.",
         table(_WEAK, report.weak),
         "## Collectives",
         f"Allgatherv; latency {model.latency:.2g} s, bandwidth {model.bandwidth:.2g} bytes/s.",
         table(_COLLECTIVE, report.collectives),
         "## Model",
-        "t(G) = (pair·P² + point·P)/G + repeated·P + fixed + gathers·(latency·⌈log₂ G⌉ + bytes·P·(G − 1)/"
-        f"(G·bandwidth)) for P points on G ranks, with {_constants(model)}.  Its "
+        "t(G) = (level·P·log₂ P + point·P)/G + repeated·P + fixed + gathers·(latency·⌈log₂ G⌉ + "
+        f"bytes·P·(G − 1)/(G·bandwidth)) for P points on G ranks, with {_constants(model)}.  Its "
         f"largest deviation from a measured time is {report.largest_misprediction:.0%}.  Latency and "
         "bandwidth are those of this machine; a network's are others.",
         table(_PREDICTION, report.predictions),
         "## Ranks for a run",
         f"The most ranks, up to 10,000, on which the model is {LEAST_EFFICIENCY:.0%} efficient.",
         table({"vesicles": "vesicles", "ranks": "ranks"}, report.recommendations),
-        "## Cost against the number of vesicles, and fast summation",
-        f"{crossover.assumption}  Then a point costs as much as {crossover.pairs_a_point:.0f} pairs of the "
-        f"direct sum, of {crossover.pair_seconds:.2g} s each here, and {crossover.point_seconds:.2g} s in an "
-        f"evaluation.  Against that, series of whole vesicles make the time above grow by {model.pair:.2g} s "
-        f"for each pair.",
+        "## Cost against the number of vesicles",
+        "On one rank, and the memory of the process.",
         table(_COST, report.costs),
         "## Many groups of ranks",
         *_groups(report),
@@ -145,6 +142,6 @@ def _groups(report: Scaling) -> list[str]:
 
 def _constants(model: ScalingModel) -> str:
     """Return the constants of computed times, and how often and how much is exchanged."""
-    seconds = {name: getattr(model, name) for name in ("pair", "point", "repeated", "fixed")}
+    seconds = {name: getattr(model, name) for name in ("level", "point", "repeated", "fixed")}
     each = [f"{name} = {value:.3g} s" for name, value in seconds.items()]
     return ", ".join([*each, f"gathers = {model.gathers:.3g}", f"bytes = {model.bytes_a_point:.3g}"])

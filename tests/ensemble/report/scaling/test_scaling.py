@@ -26,10 +26,8 @@ from ensemble.report.scaling.scaling_document import (
 )
 from ensemble.report.scaling.scaling_figures import scaling_figures
 from ensemble.report.scaling.scaling_fit import (
-    fast_summation_seconds,
     fit_model,
     recommend_ranks,
-    summation_crossover,
 )
 from ensemble.report.scaling.scaling_plan import FULL, POINTS, QUICK, ScalingPlan, suspension
 from ensemble.report.scaling.scaling_text import scaling_conclusions, scaling_text
@@ -41,7 +39,7 @@ from tests.conftest import Launcher
 from tests.ensemble.runs import shear_run, shear_scene
 
 KNOWN = ScalingModel(
-    pair=3e-8,
+    level=3e-7,
     point=5e-6,
     repeated=4e-6,
     fixed=2e-4,
@@ -56,7 +54,9 @@ def test_one_rank_exchanges_nothing_and_is_efficient():
     for points in (64, 10_000):
         assert KNOWN.collectives(points, 1) == 0
         assert KNOWN.efficiency(points, 1) == 1
-        assert KNOWN.seconds(points, 1) == pytest.approx(3e-8 * points**2 + 9e-6 * points + 2e-4)
+        assert KNOWN.seconds(points, 1) == pytest.approx(
+            3e-7 * points * math.log2(points) + 9e-6 * points + 2e-4
+        )
 
 
 def test_an_evaluation_takes_at_least_what_every_rank_repeats_and_exchanges():
@@ -85,7 +85,6 @@ COSTS = [
         seconds=KNOWN.seconds(POINTS * vesicles, 1),
         sums=8.0,
         peak_memory_bytes=1,
-        with_fast_summation=None,
     )
     for vesicles in (8, 16, 32, 64, 128)
 ]
@@ -113,14 +112,6 @@ def test_the_recommendation_is_the_last_efficient_number_of_ranks():
         assert found.ranks == 10_000 or KNOWN.efficiency(points, found.ranks + 1) < LEAST_EFFICIENCY
     pair = load_scene("doublet-shear")
     assert recommended_ranks(pair, 64) == MEASURED.recommended_ranks(64, 64)  # its image is not computed
-
-
-def test_fast_summation_pays_beyond_the_crossover():
-    found = summation_crossover(KNOWN, COSTS, pair_seconds=2e-9)
-    assert found.pairs_a_point == pytest.approx(3 * 2 * 9 * math.sqrt(3) * found.terms)
-    assert found.point_seconds == pytest.approx(8 * 2e-9 * found.pairs_a_point)
-    for vesicles, pays in ((found.vesicles // 2, False), (2 * found.vesicles, True)):
-        assert (fast_summation_seconds(KNOWN, found, vesicles) < KNOWN.seconds(POINTS * vesicles, 1)) is pays
 
 
 def test_what_is_gathered_is_counted():
@@ -230,7 +221,7 @@ def assert_drawn_and_written(report: Scaling, directory: Path) -> None:
     text = scaling_text(report, ["cost.png"])
     assert "![cost.png](cost.png)" in text
     assert text.split("\n\n")[1].splitlines() == [f"- {each}" for each in scaling_conclusions(report)]
-    assert f"{report.crossover.pairs_a_point:.0f} pairs of the direct sum" in text
+    assert "## Cost against the number of vesicles" in text
     for point in report.evaluations:
         assert f"{point.seconds:.4g}" in text
 
@@ -244,7 +235,6 @@ def test_an_evaluation_is_measured_on_a_single_rank(launcher: Launcher, tmp_path
     assert point.kernels > point.collectives
     assert point.kernels + point.collectives + point.solves + point.other == pytest.approx(1.0)
     assert report.collectives == []
-    assert report.crossover.pair_seconds > 0
     assert all(cost.sums > 1 for cost in report.costs)
     assert_drawn_and_written(report, tmp_path)
 
