@@ -140,15 +140,16 @@ class ScalingModel(BaseModel):
         return max(enough, default=1)
 
 
-# Measured by `mpirun -bind-to core -n 2 ensemble report scaling` on an idle machine of two cores (EPYC, AVX2,
-# MPICH, shared memory): 8 to 1024 vesicles of 64 points, within 3 % of all times.
+# Computing: processor times by `python -m tests.benchmarks.ranks` with 64, 256 and 1024 vesicles, within 15 %
+# (Xeon, AVX-512).  Gathers: `ensemble report scaling --quick`.  Latency and bandwidth: the same report on an
+# idle machine of two cores (EPYC, MPICH, shared memory).
 MEASURED: Final = ScalingModel(
-    level=1.5e-07,
-    point=2e-06,
-    repeated=2.1e-06,
-    fixed=0.0021,
-    gathers=27.5,
-    bytes_a_point=15.0,
+    level=4.3e-07,
+    point=0.0,
+    repeated=6e-07,
+    fixed=0.001,
+    gathers=35.0,
+    bytes_a_point=9.4,
     latency=6.1e-06,
     bandwidth=1.6e09,
 )

@@ -225,11 +225,13 @@ def write_sources(
 
     Returns
     -------
-    near, far : int
-        How many points are in each list.
+    near : int
+        How many points are in the list of near ones.
+    far : int
+        And in the other.
     """
     tree, order = clusters.tree, clusters.nodes.size
-    count, _n = points.shape[1], points.shape[2]
+    count = points.shape[1]
     tree.radii[target]
     allowed = clusters.accuracy * _largest_force(formula, parameters, clusters, target)
     waiting = np.empty(count + 1, dtype=np.int64)
