@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import json
 import os
-import random
 import subprocess
 import sys
-import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -24,8 +22,8 @@ from solver.analysis.run import Run
 from solver.scene import Vesicle
 from tests.ensemble.runs import failed_run, shear_run, shear_scene
 
-EXPORT_FOREVER = """
-import sys
+KILLED_EXPORTS = """
+import os, random, signal, sys, time
 from dataclasses import replace
 from pathlib import Path
 import numpy as np
@@ -33,15 +31,52 @@ from ensemble.store.exports import exported_arrays
 from ensemble.store.hdf5_export import write_netcdf
 from ensemble.store.run_record import RunSummary
 from tests.ensemble.runs import shear_run, shear_scene
-path, number = Path(sys.argv[1]), int(sys.argv[2])
+from tests.ensemble.store.test_hdf5_export import assert_whole
+path, moment = Path(sys.argv[1]), random.Random(5)
 run = shear_run(shear_scene(points=256), frames=500)
-while True:
-    number += 1
-    frames = replace(run.frames, tension=np.full_like(run.frames.tension, number))
-    numbered = replace(run, time=float(number), frames=frames)
-    write_netcdf(RunSummary.of(numbered), exported_arrays(numbered), path)
-    print(number, flush=True)
+acknowledged, torn = 0, 0
+
+def export_forever(number, acknowledgements):
+    while True:
+        number += 1
+        frames = replace(run.frames, tension=np.full_like(run.frames.tension, number))
+        numbered = replace(run, time=float(number), frames=frames)
+        write_netcdf(RunSummary.of(numbered), exported_arrays(numbered), path)
+        print(number, file=acknowledgements, flush=True)
+
+def parts():
+    return {entry for entry in path.parent.iterdir() if entry.name.startswith(".")}
+
+for _ in range(8):
+    earlier = parts()
+    read, write = os.pipe()
+    writer = os.fork()
+    if writer == 0:
+        with open(write, "w") as acknowledgements:
+            export_forever(acknowledged, acknowledgements)
+    os.close(write)
+    with open(read) as lines:
+        first = lines.readline()
+        time.sleep(moment.uniform(0, 0.05))
+        deadline = time.monotonic() + 10
+        while not parts() - earlier and time.monotonic() < deadline:
+            pass
+        os.kill(writer, signal.SIGKILL)
+        acknowledged = max(map(int, (first + lines.read()).split()))
+    os.waitpid(writer, 0)
+    torn += bool(parts() - earlier)
+    assert_whole(path, acknowledged)
+print(torn)
 """
+
+
+def assert_whole(path: Path, acknowledged: int) -> None:
+    """Check the file that a killed writer has left: the last export that it told of, or the next."""
+    values, attributes = read(path)
+    assert attributes["time"] in (acknowledged, acknowledged + 1)
+    assert values["tension"].shape == (500, 2, 256)
+    assert (values["tension"] == attributes["time"]).all()
+    assert {entry for entry in path.parent.iterdir() if not entry.name.startswith(".")} == {path}
 
 
 def read(path: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
@@ -99,31 +134,15 @@ def test_failed_export_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> N
 
 
 def test_file_is_whole_whenever_its_writer_is_killed(tmp_path: Path) -> None:
-    path = tmp_path / "run.h5"
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
-    moment = random.Random(5)
-    acknowledged, torn = 0, 0
-    for _ in range(8):
-        earlier = set(tmp_path.glob(".*"))
-        command = [sys.executable, "-c", EXPORT_FOREVER, str(path), str(acknowledged)]
-        with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) as writer:
-            assert writer.stdout is not None
-            first = writer.stdout.readline()
-            time.sleep(moment.uniform(0, 0.05))
-            deadline = time.monotonic() + 10
-            while not set(tmp_path.glob(".*")) - earlier and time.monotonic() < deadline:
-                pass
-            writer.kill()
-            lines = (first + writer.stdout.read()).split()
-        acknowledged = max(map(int, lines))
-        torn += bool(set(tmp_path.glob(".*")) - earlier)
-        values, attributes = read(path)
-        # The last export may be in place although its writer had no time to say so.
-        assert attributes["time"] in (acknowledged, acknowledged + 1)
-        assert values["tension"].shape == (500, 2, 256)
-        assert (values["tension"] == attributes["time"]).all()
-        assert {entry for entry in tmp_path.iterdir() if not entry.name.startswith(".")} == {path}
-    assert torn > 0, "no writer was killed in the middle of a write"
+    killed = subprocess.run(
+        [sys.executable, "-c", KILLED_EXPORTS, str(tmp_path / "run.h5")],
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert killed.returncode == 0, killed.stderr
+    assert int(killed.stdout) > 0, "no writer was killed in the middle of a write"
 
 
 def test_xarray_opens_an_export_with_names_coordinates_and_units_and_writes_it_again(tmp_path: Path) -> None:
