@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from ensemble.store import Store
     from ensemble.store.listing import Listing
     from solver.analysis.run import Run
-    from solver.simulation.steady_scenes import Shapes
+    from solver.simulation.vesicle_shapes import Shapes
 
 
 @dataclass(frozen=True)
@@ -292,7 +292,7 @@ def run_of(scene: Scene, store: Store | None) -> Run:
 def _end_of_run(scene: Scene, store: Store | None) -> Shapes | str:
     """Return the shapes at the end of the scene's run, or why it comes to no rest."""
     from solver.analysis.run import Outcome
-    from solver.simulation.steady_scenes import Shapes
+    from solver.simulation.vesicle_shapes import Shapes
 
     run = run_of(scene, store)
     if run.outcome in (Outcome.FAILED, Outcome.SEPARATED, Outcome.TUMBLING):

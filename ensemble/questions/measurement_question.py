@@ -29,7 +29,8 @@ if TYPE_CHECKING:
 
     from ensemble.display.progress import Display
     from ensemble.store import Store
-    from solver.simulation.steady_scenes import Shapes, SteadyBranch, SteadyPoint
+    from solver.simulation.steady_scenes import SteadyBranch, SteadyPoint
+    from solver.simulation.vesicle_shapes import Shapes
 
 _HAMAKER: Final = "adhesion.hamaker"
 _RATE, _AREA, _DISTANCE = (INPUTS[name] for name in ("rate", "reduced_area", "distance"))
@@ -212,7 +213,7 @@ def measure(measurement: AdhesionMeasurement, path: Path | None, on_step: Callab
 def _side_by_side(measurement: AdhesionMeasurement, store: Store | None) -> tuple[Scene, Shapes] | str:
     """Return a scene with more adhesion and its pair at rest side by side, or why there is none."""
     from solver.analysis.run import Outcome
-    from solver.simulation.steady_scenes import Shapes
+    from solver.simulation.vesicle_shapes import Shapes
 
     rate = parameter_value(measurement.scene, _RATE)
     strength = _ABOVE * _KNOWN_FOLD * rate / measurement.adhesion.distance
@@ -297,7 +298,7 @@ class _Loss(NamedTuple):
     def dependence(self, on_step: Callable[[str], None]) -> _Dependence:
         """Find the loss again with changed inputs and with more points."""
         from solver.membrane.resampling import resampled_angle
-        from solver.simulation.steady_scenes import Shapes
+        from solver.simulation.vesicle_shapes import Shapes
 
         scene, shapes = self.shortly_before.state.scene, self.shortly_before.state.shapes
         strength = parameter_value(scene, _HAMAKER)

@@ -11,7 +11,6 @@ from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 from solver.analysis.settling import KEPT_HALF_TURNS, has_settled
-from solver.membrane import curve
 from solver.memory import Remembering
 from solver.roots import root
 
@@ -20,7 +19,6 @@ if TYPE_CHECKING:
     from solver.integrators import Step
     from solver.membrane.geometry import Membranes
     from solver.memory import Saved
-    from solver.scene import Scene
 
 Array = NDArray[np.float64]
 
@@ -235,31 +233,6 @@ class RevolutionTracker(Remembering, ABC):
     def _unwrapped(self, state: Array, near: float) -> float:
         angle = self._direction(state)
         return angle + self.direction_period * round((near - angle) / self.direction_period)
-
-
-class LongAxisTracker(RevolutionTracker):
-    """Follows the long principal axis of a single vesicle, a line without a direction."""
-
-    direction_period = np.pi
-
-    def _direction(self, state: Array) -> float:
-        return float(curve.inclination_by_angle(self.membranes.tangent_angle(state))[0])
-
-
-def may_tumble(scene: Scene) -> bool:
-    """Return whether a scene is a single vesicle with a long axis, in a flow that rotates it.
-
-    Parameters
-    ----------
-    scene : Scene
-
-    Returns
-    -------
-    bool
-    """
-    flow = scene.imposed_flow
-    rotates = flow is not None and flow.rotates
-    return len(scene.vesicles) == 1 and rotates and scene.vesicles[0].reduced_area < 1
 
 
 def extremes(

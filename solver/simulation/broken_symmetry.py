@@ -21,7 +21,7 @@ from solver.membrane.symmetry import has_images
 from solver.motion.terms import accurate_equation
 from solver.simulation.blas_threads import one_blas_thread
 from solver.simulation.resolution import with_points
-from solver.simulation.steady_scenes import Shapes
+from solver.simulation.vesicle_shapes import Shapes
 
 if TYPE_CHECKING:
     from solver.analysis.run import Run

@@ -15,6 +15,7 @@ from solver.analysis.free_energy import energy_of
 from solver.analysis.spatial_error import shape_tails, spatial_error
 from solver.membrane.symmetry import has_images, independent_vesicles
 from solver.motion.terms import accurate_equation
+from solver.simulation.vesicle_shapes import Shapes
 from solver.steady_states.continuation import Continuation, Limits
 from solver.steady_states.newton import steady_state
 from solver.steady_states.stability import Perturbations
@@ -32,20 +33,6 @@ ComplexArray = NDArray[np.complex128]
 
 _KEPT_EIGENVALUES = 6
 _NEARBY = 1e-3  # relative change of a parameter that shows whether it changes both vesicles of a pair alike
-
-
-@dataclass(frozen=True)
-class Shapes:
-    """The membranes of a scene at one instant.
-
-    Attributes
-    ----------
-    tangent_angle : (vesicles, points)
-    center : (vesicles, 2)
-    """
-
-    tangent_angle: Array
-    center: Array
 
 
 @dataclass(frozen=True)

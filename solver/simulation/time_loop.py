@@ -11,13 +11,9 @@ from numpy.typing import NDArray
 from solver.analysis.answer_errors import AnswerErrors
 from solver.analysis.criteria import History, criteria_for
 from solver.analysis.line_of_centers import LineOfCenters
+from solver.analysis.long_axis import LongAxisTracker, may_tumble
 from solver.analysis.recorder import Recorder
-from solver.analysis.revolutions import (
-    LongAxisTracker,
-    RevolutionTracker,
-    counted_direction,
-    may_tumble,
-)
+from solver.analysis.revolutions import RevolutionTracker, counted_direction
 from solver.analysis.run import Outcome
 from solver.analysis.viscosity_history import ViscosityHistory
 from solver.integrators import Step, StepFailedError

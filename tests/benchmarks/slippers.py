@@ -19,7 +19,8 @@ from ensemble import load_scene
 from ensemble.config.overrides import override
 from ensemble.config.validation import validated
 from solver import Run, Scene, simulate
-from solver.simulation.steady_scenes import Shapes, follow_steady_states
+from solver.simulation.steady_scenes import follow_steady_states
+from solver.simulation.vesicle_shapes import Shapes
 from solver.steady_states.continuation import Limits
 
 # Degrees, by reduced area, at peak velocities of 400, 800, 1200 and 1600 µm/s.

@@ -19,7 +19,8 @@ from ensemble import load_scene
 from ensemble.config.overrides import override
 from ensemble.config.validation import validated
 from solver import Scene, simulate
-from solver.simulation.steady_scenes import Shapes, SteadyBranch, follow_steady_states
+from solver.simulation.steady_scenes import SteadyBranch, follow_steady_states
+from solver.simulation.vesicle_shapes import Shapes
 from solver.steady_states.continuation import Limits, OutsideParameterError
 
 RATE, AREA, CONTRAST = "flow.rate", "vesicles.reduced_area", "vesicles.viscosity_contrast"

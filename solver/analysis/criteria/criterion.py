@@ -14,7 +14,7 @@ from solver.memory import Remembering, Saved, plain
 
 if TYPE_CHECKING:
     from solver.analysis.line_of_centers import LineOfCenters
-    from solver.analysis.revolutions import LongAxisTracker
+    from solver.analysis.long_axis import LongAxisTracker
     from solver.analysis.run import Outcome
     from solver.membrane.geometry import Membranes
     from solver.scene import Scene

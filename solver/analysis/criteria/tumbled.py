@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from solver.analysis.criteria.criterion import Criterion, History
-from solver.analysis.revolutions import may_tumble
+from solver.analysis.long_axis import may_tumble
 from solver.analysis.run import Outcome
 
 if TYPE_CHECKING:

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from solver.analysis.revolutions import LongAxisTracker, counted_direction
+from solver.analysis.long_axis import LongAxisTracker
+from solver.analysis.revolutions import counted_direction
 from solver.analysis.run import Outcome
 from solver.flows import Linear, Shear
 from solver.integrators import Step

@@ -9,7 +9,8 @@ from solver.motion.terms import accurate_equation
 from solver.scene import Numerics, PowerLaw, Scene, Shear, Start, Trap, Vesicle
 from solver.simulation.broken_symmetry import symmetry_breaking, symmetry_growth
 from solver.simulation.simulate import simulate
-from solver.simulation.steady_scenes import Shapes, find_steady_state
+from solver.simulation.steady_scenes import find_steady_state
+from solver.simulation.vesicle_shapes import Shapes
 from solver.steady_states.stability import Perturbations
 from solver.steady_states.steady_equations import SteadyEquations
 

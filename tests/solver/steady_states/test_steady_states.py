@@ -16,7 +16,8 @@ from solver.scene import Numerics, PowerLaw, Scene, Shear, Start, Trap, Vesicle
 from solver.simulation.initial_state import placed_state
 from solver.simulation.resolution import with_points
 from solver.simulation.simulate import simulate
-from solver.simulation.steady_scenes import Shapes, SteadyBranch, find_steady_state, follow_steady_states
+from solver.simulation.steady_scenes import SteadyBranch, find_steady_state, follow_steady_states
+from solver.simulation.vesicle_shapes import Shapes
 from solver.steady_states.continuation import Limits, OutsideParameterError
 from solver.steady_states.newton import NoSteadyStateError, correction, steady_state
 from solver.steady_states.stability import Perturbations

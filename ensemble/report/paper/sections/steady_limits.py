@@ -29,7 +29,8 @@ from ensemble.report.paper.sections.viscosity_contrasts import keller_skalak
 from ensemble.store.branch_record import summary_of
 from solver.scene import Scene, Trap
 from solver.simulation.resolution import with_points
-from solver.simulation.steady_scenes import Shapes, SteadyBranch, follow_steady_states
+from solver.simulation.steady_scenes import SteadyBranch, follow_steady_states
+from solver.simulation.vesicle_shapes import Shapes
 from solver.steady_states.continuation import Limits, OutsideParameterError
 from solver.steady_states.newton import NoSteadyStateError
 
