@@ -38,6 +38,9 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 _PROBED_EVERY = 3  # steps; more often costs more and, measured over eight scenes, gains nothing
+# Far beyond every state: an error as large says that nothing is known, and it must not overflow where it goes on
+# to grow, as in a motion that never repeats itself.
+_LOST = 1e9
 # Root mean square; differences of rates would be noise if they were smaller, and not linear if larger.
 _LEAST_PROBE, _LARGEST_PROBE = 1e-3, 1e-2
 
@@ -175,6 +178,10 @@ class PropagatedError:
         if self._deviation and self._deviation.jacobian is step.jacobian:
             change = change + step.solve(step.duration * (self._deviation @ error))
         extended(table, order, change + remainder[:, None] * signs)
+        if self._steps % _PROBED_EVERY == 0:
+            largest = np.abs(table[0]).max(axis=0)
+            if largest.max() > _LOST:
+                table *= np.minimum(1.0, _LOST / largest)
 
     def _signs(self) -> Array:
         """Return the signs of a source, (2,)."""

@@ -66,6 +66,26 @@ def test_a_jacobian_that_is_wrong_is_seen_through() -> None:
     assert step.error(10.0)[0, 0] == pytest.approx(step.state[0] - np.exp(10.0), rel=0.4)
 
 
+def lorenz(y: Array) -> Array:
+    return np.array([10.0 * (y[1] - y[0]), y[0] * (28.0 - y[2]) - y[1], y[0] * y[1] - 8.0 / 3.0 * y[2]])
+
+
+def lorenz_jacobian(y: Array) -> Array:
+    return np.array([[-10.0, 10.0, 0.0], [28.0 - y[2], -1.0, -y[0]], [y[1], y[0], -8.0 / 3.0]])
+
+
+def test_an_error_that_grows_for_ever_stays_a_number() -> None:
+    """Where motion never repeats itself, errors grow without bound; the one at the start is nearly too large."""
+    problem = InitialValueProblem(
+        FunctionEquation(lorenz, lorenz_jacobian), np.ones(3), 0.0, 20.0, np.full((3, 2), 1e150)
+    )
+    steps = all_steps(BackwardDifferentiation(problem, 1e-4), 20.0)
+    errors = np.array([step.error(step.end) for step in steps if step.error])
+    assert len(errors) == len(steps)
+    assert np.all(np.isfinite(errors))
+    assert np.abs(errors[-1]).max() > 1e6, "nothing is known any more, and it must not look as if it were"
+
+
 def final(scene: Scene, tolerance: float) -> tuple[Array, Array]:
     """Return the last state and its error."""
     equation = equation_of_motion(scene)
