@@ -38,8 +38,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 _PROBED_EVERY = 3  # steps; more often costs more and, measured over eight scenes, gains nothing
-# Far beyond every state: an error as large says that nothing is known, and it must not overflow where it goes on
-# to grow, as in a motion that never repeats itself.
+# Far beyond every state: an error as large says that nothing is known.  In a motion that never repeats
+# itself it would go on to grow until it overflows.
 _LOST = 1e9
 # Root mean square; differences of rates would be noise if they were smaller, and not linear if larger.
 _LEAST_PROBE, _LARGEST_PROBE = 1e-3, 1e-2

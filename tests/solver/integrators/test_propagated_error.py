@@ -75,7 +75,7 @@ def lorenz_jacobian(y: Array) -> Array:
 
 
 def test_an_error_that_grows_for_ever_stays_a_number() -> None:
-    """Where motion never repeats itself, errors grow without bound; the one at the start is nearly too large."""
+    """Where motion never repeats itself, errors grow without bound; this one is huge at once."""
     problem = InitialValueProblem(
         FunctionEquation(lorenz, lorenz_jacobian), np.ones(3), 0.0, 20.0, np.full((3, 2), 1e150)
     )
