@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from solver.analysis.revolutions import CountedDirection, RevolutionTracker, crossing, extremes
 from solver.analysis.settling import KEPT_HALF_TURNS
-from solver.membrane import curve
+from solver.membrane.inclination import inclination_by_angle
 
 if TYPE_CHECKING:
     from solver.integrators import Step
@@ -158,7 +158,7 @@ class LineOfCenters(RevolutionTracker):
         return np.asarray(angles + np.pi * np.round((near - angles) / np.pi))
 
     def _own_directions(self, state: Array) -> Array:
-        return curve.inclination_by_angle(self.membranes.tangent_angle(state))
+        return inclination_by_angle(self.membranes.tangent_angle(state))
 
     def distance_of(self, state: Array) -> float:
         """Return the center distance in a state.

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.analysis.revolutions import RevolutionTracker
-from solver.membrane import curve
+from solver.membrane.inclination import inclination_by_angle
 
 if TYPE_CHECKING:
     from solver.scene import Scene
@@ -22,7 +22,7 @@ class LongAxisTracker(RevolutionTracker):
     direction_period = np.pi
 
     def _direction(self, state: Array) -> float:
-        return float(curve.inclination_by_angle(self.membranes.tangent_angle(state))[0])
+        return float(inclination_by_angle(self.membranes.tangent_angle(state))[0])
 
 
 def may_tumble(scene: Scene) -> bool:

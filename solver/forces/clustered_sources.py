@@ -191,7 +191,7 @@ def _largest_force(formula: PairFormula, parameters: Any, clusters: Clusters, ta
             if node != target and distance < least:
                 least, nearest = distance, node
         elif distance - tree.radii[node] < least:
-            waiting[left], waiting[left + 1] = tree.children[node - count]
+            waiting[left], waiting[left + 1] = tree.children[node - count, 0], tree.children[node - count, 1]
             left += 2
     _, first, _ = derivatives(formula, least * least, parameters)
     return 2.0 * least * abs(first) * clusters.lengths[nearest]
@@ -232,7 +232,6 @@ def write_sources(
     """
     tree, order = clusters.tree, clusters.nodes.size
     count = points.shape[1]
-    tree.radii[target]
     allowed = clusters.accuracy * _largest_force(formula, parameters, clusters, target)
     waiting = np.empty(count + 1, dtype=np.int64)
     waiting[0] = count
@@ -250,11 +249,11 @@ def write_sources(
         elif node < count:
             far += _add_vesicle(clusters, points, spacing, target, node, needed, out.far[:, far:])
             continue
-        elif order * np.arcsinh(apart / tree.extents[:, node].max()) >= needed:
+        elif order * np.arcsinh(apart / max(tree.extents[0, node], tree.extents[1, node])) >= needed:
             _add_group(clusters, node, out.far[:, far:])
             far += order * order
             continue
-        waiting[left], waiting[left + 1] = tree.children[node - count]
+        waiting[left], waiting[left + 1] = tree.children[node - count, 0], tree.children[node - count, 1]
         left += 2
     return near, far
 
@@ -305,7 +304,8 @@ def _add_vesicle(
 @compiled
 def _add_group(clusters: Clusters, node: int, out: Array) -> None:
     """Write the points that stand for a group, and their weights."""
-    tree, nodes = clusters.tree, clusters.nodes
-    size = nodes.size**2
-    out[:2, :size] = chebyshev_points(tree, node, nodes)
-    out[2, :size] = clusters.weights[node - tree.children.shape[0] - 1].ravel()
+    tree, order = clusters.tree, clusters.nodes.size
+    grid = chebyshev_points(tree, node, clusters.nodes)
+    weights = clusters.weights[node - tree.children.shape[0] - 1]
+    for k in range(order * order):
+        out[0, k], out[1, k], out[2, k] = grid[0, k], grid[1, k], weights[k // order, k % order]

@@ -52,7 +52,9 @@ def add_clustered_density(
         Added to.
     """
     lists = _lists(clusters, points)
-    for vesicle, begin, end in _parts(points, first, last):
+    n = points.shape[2]
+    for vesicle in range(first // n, -(-last // n)):
+        begin, end = max(first - vesicle * n, 0), min(last - vesicle * n, n)
         near, far = write_sources(formula, parameters, clusters, points, spacing, vesicle, lists)
         targets, out = _rows(points, vesicle, begin, end), np.zeros((2, end - begin))
         grid, values = (
@@ -64,7 +66,7 @@ def add_clustered_density(
         sources, weights = _taken(lists.far, far)
         add_forces(formula, parameters, grid, sources, weights, hamaker, values)
         _add_interpolated(clusters, vesicle, values, targets, out)
-        density[:, vesicle, begin:end] += out
+        _add_rows(out, density, vesicle, begin)
 
 
 @compiled
@@ -96,7 +98,9 @@ def add_clustered_stiffness(
         Added to.
     """
     lists = _lists(clusters, points)
-    for vesicle, begin, end in _parts(points, first, last):
+    n = points.shape[2]
+    for vesicle in range(first // n, -(-last // n)):
+        begin, end = max(first - vesicle * n, 0), min(last - vesicle * n, n)
         near, far = write_sources(formula, parameters, clusters, points, spacing, vesicle, lists)
         targets, out = _rows(points, vesicle, begin, end), np.zeros((3, end - begin))
         grid, values = (
@@ -108,7 +112,7 @@ def add_clustered_stiffness(
         sources, weights = _taken(lists.far, far)
         add_stiffnesses(formula, parameters, grid, sources, weights, hamaker, values)
         _add_interpolated(clusters, vesicle, values, targets, out)
-        stiffness[:, vesicle, begin:end] += out
+        _add_rows(out, stiffness, vesicle, begin)
 
 
 @compiled
@@ -139,7 +143,9 @@ def clustered_energy(
     float
     """
     lists, total = _lists(clusters, points), 0.0
-    for vesicle, begin, end in _parts(points, first, last):
+    n = points.shape[2]
+    for vesicle in range(first // n, -(-last // n)):
+        begin, end = max(first - vesicle * n, 0), min(last - vesicle * n, n)
         near, far = write_sources(formula, parameters, clusters, points, spacing, vesicle, lists)
         targets = _rows(points, vesicle, begin, end)
         sources, weights = _taken(lists.near, near)
@@ -158,25 +164,29 @@ def _lists(clusters: Clusters, points: Array) -> SourceLists:
 
 
 @compiled
-def _parts(points: Array, first: int, last: int) -> list[tuple[int, int, int]]:
-    """Return the vesicles that have points in a range, and the ranges of their points in it."""
-    n = points.shape[2]
-    return [
-        (vesicle, max(first - vesicle * n, 0), min(last - vesicle * n, n))
-        for vesicle in range(first // n, -(-last // n))
-    ]
-
-
-@compiled
 def _taken(sources: Array, count: int) -> tuple[Array, Array]:
     """Return points (2, count) and weights of a list as arrays that loops become SIMD code for."""
-    return np.ascontiguousarray(sources[:2, :count]), np.ascontiguousarray(sources[2, :count])
+    places, weights = np.empty((2, count)), np.empty(count)
+    for k in range(count):
+        places[0, k], places[1, k], weights[k] = sources[0, k], sources[1, k], sources[2, k]
+    return places, weights
 
 
 @compiled
 def _rows(points: Array, vesicle: int, begin: int, end: int) -> Array:
     """Return some of the points of a vesicle, (2, end − begin)."""
-    return np.ascontiguousarray(points[:, vesicle, begin:end])
+    rows = np.empty((2, end - begin))
+    for i in range(end - begin):
+        rows[0, i], rows[1, i] = points[0, vesicle, begin + i], points[1, vesicle, begin + i]
+    return rows
+
+
+@compiled
+def _add_rows(out: Array, total: Array, vesicle: int, begin: int) -> None:
+    """Add values (c, ·) at the points of a vesicle from one on to those at all points, (c, M, N)."""
+    for component in range(out.shape[0]):
+        for i in range(out.shape[1]):
+            total[component, vesicle, begin + i] += out[component, i]
 
 
 @compiled

@@ -172,7 +172,8 @@ def _group(
     points: Array, spacing: Array, refinement: Refinement, g: int
 ) -> tuple[Indices, Array, Array, Array]:
     """Rows and points (2, ·) of a group's targets, and points and weights of the refined source."""
-    target, source, factor = refinement.groups[g]
+    groups = refinement.groups
+    target, source, factor = groups[g, 0], groups[g, 1], groups[g, 2]
     rows = refinement.rows[refinement.starts[g] : refinement.starts[g + 1]]
     sources = refined_points(points, source, factor, refinement)
     weights = np.empty(sources.shape[1])
@@ -302,8 +303,9 @@ def fill_hessian(
     """
     size, count = points.shape[2], hessian.shape[1] // points.shape[2]
     hessian[:] = 0.0
-    for g in range(refinement.groups.shape[0]):
-        target, source, factor = refinement.groups[g]
+    groups = refinement.groups
+    for g in range(groups.shape[0]):
+        target, source, factor = groups[g, 0], groups[g, 1], groups[g, 2]
         rows, targets, sources, weights = _group(points, spacing, refinement, g)
         pair = np.empty((3, rows.size, sources.shape[1]))
         pair_hessian(formula, parameters, targets, sources, hamaker * weights[0], pair)

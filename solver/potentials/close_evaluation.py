@@ -288,8 +288,9 @@ def refine_single_layer(points: Array, refinement: Refinement, components: Array
         Number of the point in the first row.
     """
     n = points.shape[2]
-    for g in range(refinement.groups.shape[0]):
-        target, source, factor = refinement.groups[g]
+    groups = refinement.groups
+    for g in range(groups.shape[0]):
+        target, source, factor = groups[g, 0], groups[g, 1], groups[g, 2]
         if factor == 1 or factor > LARGEST_REFINED:
             continue
         rows = refinement.rows[refinement.starts[g] : refinement.starts[g + 1]]
@@ -331,8 +332,9 @@ def close_single_layer(
         Number of the point in the first row.
     """
     n = points.shape[2]
-    for g in range(refinement.groups.shape[0]):
-        target, source, factor = refinement.groups[g]
+    groups = refinement.groups
+    for g in range(groups.shape[0]):
+        target, source, factor = groups[g, 0], groups[g, 1], groups[g, 2]
         if factor <= LARGEST_REFINED:
             continue
         rows = refinement.rows[refinement.starts[g] : refinement.starts[g + 1]]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from solver.compilation import compiled
 from solver.membrane.products import multiply_both
 from solver.membrane.spectral import interpolation, interpolations
-from solver.potentials.refinement import MAXIMUM_FACTOR, Refinement, group_targets
+from solver.potentials.refinement import MAXIMUM_FACTOR, Refinement, group_targets, selected_points
 from solver.potentials.stokeslets import distances
 
 if TYPE_CHECKING:
@@ -35,18 +35,23 @@ def _near_distances(
 
     Infinite where the point is not within ``reach`` (k,) of the circle about the source.
     """
+    rows = np.empty(points.shape[2], dtype=np.int64)
     for pair in range(pairs.shape[0]):
-        target, source = pairs[pair]
+        target, source = pairs[pair, 0], pairs[pair, 1]
         limit = (radii[source] + reach[pair]) ** 2
-        dx = points[0, target] - centers[0, source]
-        dy = points[1, target] - centers[1, source]
-        rows = np.flatnonzero(dx * dx + dy * dy <= limit)
-        out[pair] = np.inf
-        if rows.size == 0:
+        found = 0
+        for i in range(rows.size):
+            dx = points[0, target, i] - centers[0, source]
+            dy = points[1, target, i] - centers[1, source]
+            out[pair, i] = np.inf
+            if dx * dx + dy * dy <= limit:
+                rows[found] = i
+                found += 1
+        if found == 0:
             continue
-        near = np.empty(rows.size)
-        distances(points[:, target][:, rows], points[:, source], tangents[:, source], spacing[source], near)
-        for k in range(rows.size):
+        near, targets = np.empty(found), selected_points(points, target, rows[:found])
+        distances(targets, points[:, source], tangents[:, source], spacing[source], near)
+        for k in range(found):
             if near[k] <= reach[pair]:
                 out[pair, rows[k]] = near[k]
 

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.compilation import compiled
-from solver.membrane.products import multiply_both
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -221,7 +220,13 @@ def refined_points(points: Array, source: int, factor: int, refinement: Refineme
         for j in range(x.size):
             refined[0, j], refined[1, j] = x[j], y[j]
     else:
-        multiply_both(interpolation_to(refinement, factor), x, y, refined[0], refined[1])
+        matrix = interpolation_to(refinement, factor)
+        for i in range(refined.shape[1]):
+            row, fine_x, fine_y = matrix[i], 0.0, 0.0
+            for j in range(x.size):
+                fine_x += row[j] * x[j]
+                fine_y += row[j] * y[j]
+            refined[0, i], refined[1, i] = fine_x, fine_y
     return refined
 
 

@@ -28,7 +28,14 @@ from solver.potentials.multipoles import (
     write_moments,
 )
 from solver.potentials.quadrature import required_ratio
-from solver.potentials.refinement import LARGEST_REFINED, Refinement, interpolation_to, refined_points, within
+from solver.potentials.refinement import (
+    LARGEST_REFINED,
+    Refinement,
+    interpolation_to,
+    refined_points,
+    selected_points,
+    within,
+)
 from solver.potentials.single_layer import row_costs
 from solver.potentials.stokeslets import stokeslets
 from solver.potentials.vesicle_tree import FarNodes, interactions, vesicle_tree
@@ -61,18 +68,19 @@ def _near_blocks(
 ) -> None:
     """Write what the trapezoid rule misses at near targets, components (rows, 3, n) row by row."""
     n = points.shape[2]
-    for g in range(refinement.groups.shape[0]):
-        target, source, factor = refinement.groups[g]
+    groups = refinement.groups
+    for g in range(groups.shape[0]):
+        target, source, factor = groups[g, 0], groups[g, 1], groups[g, 2]
         first, last = refinement.starts[g], refinement.starts[g + 1]
-        targets = points[:, target][:, refinement.rows[first:last]]
-        coarse = np.ascontiguousarray(points[:, source])
+        targets = selected_points(points, target, refinement.rows[first:last])
+        coarse = refined_points(points, source, 1, refinement)
         plain, better = np.empty((3, last - first, n)), np.empty((3, last - first, n))
         stokeslets(targets, coarse, plain)
         if factor > LARGEST_REFINED:
             close_stokeslets(
                 targets,
                 coarse,
-                np.ascontiguousarray(tangents[:, source]),
+                refined_points(tangents, source, 1, refinement),
                 spacing[source],
                 correction,
                 differentiation,
@@ -84,7 +92,10 @@ def _near_blocks(
             stokeslets(targets, fine, refined)
             folding = interpolation_to(refinement, factor)
             for component in range(3):
-                better[component] = np.dot(refined[component], folding) / factor
+                folded = np.dot(refined[component], folding)
+                for row in range(last - first):
+                    for j in range(n):
+                        better[component, row, j] = folded[row, j] / factor
         for row in range(first, last):
             for component in range(3):
                 for j in range(n):

@@ -88,9 +88,10 @@ def vesicle_tree(centers: Array, radii: Array) -> VesicleTree:
     count = radii.size
     node_centers, node_radii = np.empty((2, 2 * count - 1)), np.empty(2 * count - 1)
     extents = np.empty((2, 2 * count - 1))
-    node_centers[:, :count] = centers
-    node_radii[:count] = radii
-    extents[:, :count] = radii
+    for vesicle in range(count):
+        node_radii[vesicle] = radii[vesicle]
+        for axis in range(2):
+            node_centers[axis, vesicle], extents[axis, vesicle] = centers[axis, vesicle], radii[vesicle]
     children = np.empty((count - 1, 2), dtype=np.int64)
     members = np.arange(count)
     # Ranges of members that are still to be made nodes: first, last, and the place among the children.
@@ -99,7 +100,7 @@ def vesicle_tree(centers: Array, radii: Array) -> VesicleTree:
     left, groups = 1, 0
     while left > 0:
         left -= 1
-        first, last, place = waiting[left]
+        first, last, place = waiting[left, 0], waiting[left, 1], waiting[left, 2]
         node = members[first]
         if last - first > 1:
             node = count + groups
@@ -197,7 +198,10 @@ def interactions(
                 found[far, 3] = int(np.ceil(needed / np.log(from_target)))
                 far += 1
             elif node >= count:
-                waiting[left], waiting[left + 1] = tree.children[node - count]
+                waiting[left], waiting[left + 1] = (
+                    tree.children[node - count, 0],
+                    tree.children[node - count, 1],
+                )
                 left += 2
             else:
                 if near == pairs.shape[0]:

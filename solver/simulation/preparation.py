@@ -12,7 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.analysis.diagnostics import measures
+from solver.integrators.backward_differences import ROWS, interpolant, newton_weights
 from solver.membrane.geometry import Geometry
+from solver.membrane.inclination import inclination_by_angle
 from solver.motion.equation import Motion
 from solver.motion.terms import dense_equation
 from solver.potentials.proximity import Closeness, waist_error
@@ -61,10 +63,17 @@ def _parts(scene: Scene) -> list[Callable[[], object]]:
         for each in measures(scene, equation).values():
             each(at_rest)
 
+    def follow() -> None:
+        inclination_by_angle(geometry.tangent_angle)
+        if closeness:  # several vesicles are integrated by backward differentiation
+            newton_weights(1, 1.0)
+            interpolant(np.zeros((ROWS, state.size)), 1, 0.0, 1.0)(0.0)
+
     parts: list[Callable[[], object]] = [
         lambda: equation.rate(state),
         lambda: equation.linearize(at_rest, None),
         measure,
+        follow,
     ]
     if adhesion and closeness:
         parts.append(lambda: adhesion.jacobian(geometry, closeness))
