@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,13 @@ if TYPE_CHECKING:
     from solver.forces.pair_formulas import PairFormula
 
 Array = NDArray[np.float64]
+
+
+class _Sources(NamedTuple):
+    """Points (2, k), and the arclength (k,) that each stands for."""
+
+    points: Array
+    weights: Array
 
 
 @compiled
@@ -51,22 +58,16 @@ def add_clustered_density(
     density : (2, M, N)
         Added to.
     """
-    lists = _lists(clusters, points)
-    n = points.shape[2]
+    lists, n = _lists(clusters, points), points.shape[2]
     for vesicle in range(first // n, -(-last // n)):
-        begin, end = max(first - vesicle * n, 0), min(last - vesicle * n, n)
-        near, far = write_sources(formula, parameters, clusters, points, spacing, vesicle, lists)
-        targets, out = _rows(points, vesicle, begin, end), np.zeros((2, end - begin))
-        grid, values = (
-            chebyshev_points(clusters.tree, vesicle, clusters.nodes),
-            np.zeros((2, clusters.nodes.size**2)),
-        )
-        sources, weights = _taken(lists.near, near)
-        add_forces(formula, parameters, targets, sources, weights, hamaker, out)
-        sources, weights = _taken(lists.far, far)
-        add_forces(formula, parameters, grid, sources, weights, hamaker, values)
+        targets = _rows(points, vesicle, first, last)
+        grid = chebyshev_points(clusters.tree, vesicle, clusters.nodes)
+        near, far = _acting(formula, parameters, clusters, points, spacing, vesicle, lists)
+        out, values = np.zeros((2, targets.shape[1])), np.zeros((2, grid.shape[1]))
+        add_forces(formula, parameters, targets, near.points, near.weights, hamaker, out)
+        add_forces(formula, parameters, grid, far.points, far.weights, hamaker, values)
         _add_interpolated(clusters, vesicle, values, targets, out)
-        _add_rows(out, density, vesicle, begin)
+        _add_rows(out, density, vesicle, max(first - vesicle * n, 0))
 
 
 @compiled
@@ -97,22 +98,16 @@ def add_clustered_stiffness(
     stiffness : (3, M, N)
         Added to.
     """
-    lists = _lists(clusters, points)
-    n = points.shape[2]
+    lists, n = _lists(clusters, points), points.shape[2]
     for vesicle in range(first // n, -(-last // n)):
-        begin, end = max(first - vesicle * n, 0), min(last - vesicle * n, n)
-        near, far = write_sources(formula, parameters, clusters, points, spacing, vesicle, lists)
-        targets, out = _rows(points, vesicle, begin, end), np.zeros((3, end - begin))
-        grid, values = (
-            chebyshev_points(clusters.tree, vesicle, clusters.nodes),
-            np.zeros((3, clusters.nodes.size**2)),
-        )
-        sources, weights = _taken(lists.near, near)
-        add_stiffnesses(formula, parameters, targets, sources, weights, hamaker, out)
-        sources, weights = _taken(lists.far, far)
-        add_stiffnesses(formula, parameters, grid, sources, weights, hamaker, values)
+        targets = _rows(points, vesicle, first, last)
+        grid = chebyshev_points(clusters.tree, vesicle, clusters.nodes)
+        near, far = _acting(formula, parameters, clusters, points, spacing, vesicle, lists)
+        out, values = np.zeros((3, targets.shape[1])), np.zeros((3, grid.shape[1]))
+        add_stiffnesses(formula, parameters, targets, near.points, near.weights, hamaker, out)
+        add_stiffnesses(formula, parameters, grid, far.points, far.weights, hamaker, values)
         _add_interpolated(clusters, vesicle, values, targets, out)
-        _add_rows(out, stiffness, vesicle, begin)
+        _add_rows(out, stiffness, vesicle, max(first - vesicle * n, 0))
 
 
 @compiled
@@ -142,16 +137,12 @@ def clustered_energy(
     -------
     float
     """
-    lists, total = _lists(clusters, points), 0.0
-    n = points.shape[2]
+    lists, n, total = _lists(clusters, points), points.shape[2], 0.0
     for vesicle in range(first // n, -(-last // n)):
-        begin, end = max(first - vesicle * n, 0), min(last - vesicle * n, n)
-        near, far = write_sources(formula, parameters, clusters, points, spacing, vesicle, lists)
-        targets = _rows(points, vesicle, begin, end)
-        sources, weights = _taken(lists.near, near)
-        energy = pair_energy(formula, parameters, targets, sources, weights)
-        sources, weights = _taken(lists.far, far)
-        energy += pair_energy(formula, parameters, targets, sources, weights)
+        targets = _rows(points, vesicle, first, last)
+        near, far = _acting(formula, parameters, clusters, points, spacing, vesicle, lists)
+        energy = pair_energy(formula, parameters, targets, near.points, near.weights)
+        energy += pair_energy(formula, parameters, targets, far.points, far.weights)
         total += 0.5 * spacing[vesicle] * energy
     return total
 
@@ -164,21 +155,38 @@ def _lists(clusters: Clusters, points: Array) -> SourceLists:
 
 
 @compiled
-def _taken(sources: Array, count: int) -> tuple[Array, Array]:
-    """Return points (2, count) and weights of a list as arrays that loops become SIMD code for."""
-    places, weights = np.empty((2, count)), np.empty(count)
-    for k in range(count):
-        places[0, k], places[1, k], weights[k] = sources[0, k], sources[1, k], sources[2, k]
-    return places, weights
-
-
-@compiled
-def _rows(points: Array, vesicle: int, begin: int, end: int) -> Array:
-    """Return some of the points of a vesicle, (2, end − begin)."""
+def _rows(points: Array, vesicle: int, first: int, last: int) -> Array:
+    """Return the points of a vesicle that are in a range, (2, ·)."""
+    n = points.shape[2]
+    begin, end = max(first - vesicle * n, 0), min(last - vesicle * n, n)
     rows = np.empty((2, end - begin))
     for i in range(end - begin):
         rows[0, i], rows[1, i] = points[0, vesicle, begin + i], points[1, vesicle, begin + i]
     return rows
+
+
+@compiled
+def _acting(
+    formula: PairFormula,
+    parameters: Any,
+    clusters: Clusters,
+    points: Array,
+    spacing: Array,
+    vesicle: int,
+    lists: SourceLists,
+) -> tuple[_Sources, _Sources]:
+    """Return what acts on each point of a vesicle, and what is interpolated to them."""
+    near, far = write_sources(formula, parameters, clusters, points, spacing, vesicle, lists)
+    return _taken(lists.near, near), _taken(lists.far, far)
+
+
+@compiled
+def _taken(sources: Array, count: int) -> _Sources:
+    """Return some points of a list as arrays that loops become SIMD code for."""
+    places, weights = np.empty((2, count)), np.empty(count)
+    for k in range(count):
+        places[0, k], places[1, k], weights[k] = sources[0, k], sources[1, k], sources[2, k]
+    return _Sources(places, weights)
 
 
 @compiled
