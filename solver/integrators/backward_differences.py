@@ -38,11 +38,8 @@ def extended(table: Array, order: int, difference: Array) -> None:
         table[row] += table[row + 1]
 
 
-@compiled
-def newton_weights(order: int, factor: float) -> Array:
-    """Return the weights of differences in the values at multiples of another step.
-
-    By Newton's formula y(t + s·h) = Σₘ ∇ᵐy s(s + 1)…(s + m − 1)/m!.
+def rescaling(order: int, factor: float) -> Array:
+    """Return the matrix from differences to those of values at multiples of another step.
 
     Parameters
     ----------
@@ -53,8 +50,18 @@ def newton_weights(order: int, factor: float) -> Array:
     Returns
     -------
     (order + 1, order + 2)
-        Row j for the value j new steps back; the last column is the first term that a polynomial of this
-        order leaves out.
+        From the rows up to the order; the last column is for the first term that a polynomial of this order
+        leaves out.
+    """
+    return _differences_of_values(order) @ _newton_weights(order, factor)
+
+
+@compiled
+def _newton_weights(order: int, factor: float) -> Array:
+    """Return the weights of differences in the values at multiples of another step, (order + 1, order + 2).
+
+    Row j is for the value j new steps back, by Newton's formula
+    y(t + s·h) = Σₘ ∇ᵐy s(s + 1)…(s + m − 1)/m!.
     """
     weights = np.empty((order + 1, order + 2))
     for value in range(order + 1):
@@ -93,17 +100,8 @@ def combined(weights: Array, table: Array) -> Array:
 
 
 @cache
-def differences_of_values(order: int) -> Array:
-    """Return the matrix from values, the latest first, to their backward differences.
-
-    Parameters
-    ----------
-    order : int
-
-    Returns
-    -------
-    (order + 1, order + 1)
-    """
+def _differences_of_values(order: int) -> Array:
+    """Return the matrix from values, the latest first, to their backward differences."""
     rows = range(order + 1)
     return np.array([[float((-1) ** value * comb(row, value)) for value in rows] for row in rows])
 

@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 from solver.integrators.backward_differences import (
     MAX_ORDER,
     ROWS,
-    differences_of_values,
     extended,
     interpolant,
-    newton_weights,
+    rescaling,
 )
 from solver.integrators.control import root_mean_square
 from solver.integrators.integrator import InitialValueProblem, Integrator, Step, StepFailedError, register
@@ -283,10 +282,10 @@ class BackwardDifferentiation(Remembering):
     def _rescale(self, factor: float) -> None:
         """Change the step size by a factor."""
         order, table = self._order, self._table
-        weights = newton_weights(order, factor)
+        matrix = rescaling(order, factor)
         if self._error:
-            self._error.rescale(order, weights, table[order + 1])
-        table[: order + 1] = differences_of_values(order) @ weights[:, :-1] @ table[: order + 1]
+            self._error.rescale(order, matrix, table[order + 1])
+        table[: order + 1] = matrix[:, :-1] @ table[: order + 1]
         table[order + 1] *= factor ** (order + 1)
         self._size *= factor
         self._equal_steps = 0

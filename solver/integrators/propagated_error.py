@@ -25,7 +25,6 @@ from numpy.typing import NDArray
 from solver.integrators.backward_differences import (
     ROWS,
     combined,
-    differences_of_values,
     extended,
     interpolant,
 )
@@ -198,7 +197,7 @@ class PropagatedError:
             return None
         return _Deviation(jacobian, error, rate - jacobian @ error)
 
-    def rescale(self, order: int, weights: Array, left_out: Array) -> None:
+    def rescale(self, order: int, matrix: Array, left_out: Array) -> None:
         """Change the step size.
 
         Values between the old ones come from a polynomial, which has an error of its own.
@@ -207,12 +206,11 @@ class PropagatedError:
         ----------
         order : int
             Order k of the polynomial.
-        weights : (k + 1, k + 2)
-            See `newton_weights`.
+        matrix : (k + 1, k + 2)
+            See `rescaling`.
         left_out : (n,)
             ∇ᵏ⁺¹y of the state, in the old step size.
         """
-        matrix = differences_of_values(order) @ weights
         self._table[: order + 1] = combined(matrix[:, :-1], self._table[: order + 1])
         self._table[: order + 1] -= matrix[:, -1, None, None] * left_out[:, None] * self._signs()
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from solver.analysis.diagnostics import measures
-from solver.integrators.backward_differences import ROWS, interpolant, newton_weights
+from solver.integrators.backward_differences import ROWS, interpolant, rescaling
 from solver.membrane.geometry import Geometry
 from solver.membrane.inclination import inclination_by_angle
 from solver.motion.equation import Motion
@@ -66,7 +66,7 @@ def _parts(scene: Scene) -> list[Callable[[], object]]:
     def follow() -> None:
         inclination_by_angle(geometry.tangent_angle)
         if closeness:  # several vesicles are integrated by backward differentiation
-            newton_weights(1, 1.0)
+            rescaling(1, 1.0)
             interpolant(np.zeros((ROWS, state.size)), 1, 0.0, 1.0)(0.0)
 
     parts: list[Callable[[], object]] = [
