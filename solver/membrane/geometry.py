@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.compilation import compiled
+from solver.membrane import curve
 from solver.membrane.products import multiply, multiply_both
 from solver.membrane.spectral import differentiation, integration
 from solver.membrane.symmetry import independent_vesicles
@@ -377,20 +378,6 @@ def _radii(points: Array, centers: Array) -> Array:
     return radii
 
 
-@compiled
-def _areas(points: Array, tangents: Array, length: Array) -> Array:
-    """Make the `Geometry.areas` of vesicles with points and tangents (2, M, N)."""
-    areas = np.empty(length.size)
-    for vesicle in range(length.size):
-        x, y = points[0, vesicle], points[1, vesicle]
-        tx, ty = tangents[0, vesicle], tangents[1, vesicle]
-        mean_x, mean_y, moment = x.mean(), y.mean(), 0.0
-        for j in range(x.size):
-            moment += (x[j] - mean_x) * ty[j] - (y[j] - mean_y) * tx[j]
-        areas[vesicle] = 0.5 * length[vesicle] * moment / x.size
-    return areas
-
-
 class Deformation(NamedTuple):
     """How velocities u deform the membranes.
 
@@ -466,8 +453,9 @@ class Geometry:
 
     @cached_property
     def areas(self) -> Array:
-        """Enclosed by each vesicle, (M,); see `curve.area`."""
-        return np.asarray(_areas(self.points, self.tangents, self.membranes.length))
+        """Enclosed by each vesicle, (M,)."""
+        points, tangents = self.points.swapaxes(0, 1), self.tangents.swapaxes(0, 1)
+        return curve.area(points, tangents, self.membranes.length)
 
     def arclength_derivative(self, values: Array, order: int = 1) -> Array:
         """Differentiate by arclength.
