@@ -251,7 +251,7 @@ def test_evaluations_are_measured_on_several_ranks(launcher: Launcher, tmp_path:
         assert point.gathers > 0
         assert point.kernels + point.collectives + point.solves + point.other == pytest.approx(1.0)
         assert (point.predicted is None) == (point.vesicles == 2)
-    assert [(point.vesicles, point.ranks) for point in report.weak] == [(8, 1), (11, 2), (14, 3)]
+    assert [(point.vesicles, point.ranks) for point in report.weak] == [(8, 1), (16, 2), (24, 3)]
     assert {point.ranks for point in report.collectives} == {2, 3}
     assert [cost.vesicles for cost in report.costs] == [2, 8, 12]
     memory = [cost.peak_memory_bytes for cost in report.costs]
