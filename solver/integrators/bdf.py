@@ -101,9 +101,9 @@ class BackwardDifferentiation(Remembering):
         self._jacobian = problem.equation.jacobian(problem.state)
         self.jacobian_evaluations, self.factorizations = 1, 0
         slope = problem.equation.rate(problem.state)
-        acceleration = root_mean_square(self._jacobian @ slope)
-        longest = self._end - self._time
-        self._size = min(np.sqrt(tolerance / acceleration), longest) if acceleration > 0 else longest
+        acceleration = self._jacobian @ slope
+        longest, largest = self._end - self._time, root_mean_square(acceleration)
+        self._size = min(np.sqrt(tolerance / largest), longest) if largest > 0 else longest
         self._table = np.zeros((ROWS, problem.state.size))
         self._table[0], self._table[1] = problem.state, self._size * slope
         self._order = 1
@@ -111,7 +111,11 @@ class BackwardDifferentiation(Remembering):
         self._slow = False
         self._solve: Callable[[Array], Array] | None = None
         error = np.zeros((problem.state.size, 2)) if problem.error is None else problem.error
-        self._error = PropagatedError(problem.equation.rate, error) if self._jacobian.exact else None
+        self._error = (
+            PropagatedError(problem.equation.rate, error, np.stack([slope, self._size * acceleration]))
+            if self._jacobian.exact
+            else None
+        )
 
     def saved(self) -> Saved:
         """Return the history, and the Jacobian in use; see `Remembering`.
@@ -260,7 +264,9 @@ class BackwardDifferentiation(Remembering):
             if self._equal_steps > 0:  # the next term of its expansion
                 local_error += (change - self._table[order + 1]) / (order + 2)
             step = self._linearized()
-            self._error.advance(step, local_error / _ALPHA[order], solution.remainder, solution.last)
+            # By the formula itself: a rate at the end would magnify what Newton's iteration has left.
+            slope = (change + step.weights @ self._table[1 : order + 1]) / step.duration
+            self._error.advance(step, slope, local_error / _ALPHA[order], solution.remainder, solution.last)
         extended(self._table, order, change)
         self._equal_steps += 1
 

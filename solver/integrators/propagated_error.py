@@ -8,6 +8,12 @@ The Jacobian in hand may be several steps old, and then errors grow or die out a
 motion's.  So in every third step a difference of two rates shows what it does to the error now, and until
 the next one the Jacobian is taken to be wrong in the direction of that error only.
 
+A motion that repeats itself forgets all errors but one: how far it is ahead of the exact motion in time.
+This one stays, τ dy/dt, and grows and shrinks with the slope dy/dt by factors of hundreds.  The least of it
+that such a growth turned into another direction would look like an instability.  So it is not computed step
+by step: the lead τ is a number, and only the rest of the error, d in e = τ dy/dt + d, obeys the linearized
+equation.  After every step what d has along the slope goes to the lead.
+
 Local errors of opposite signs may cancel by chance, and then what is wrong with each of them does not.  So
 the same is done for a second error, whose sources have random signs: the size that it would usually have.
 """
@@ -42,6 +48,8 @@ _PROBED_EVERY = 3  # steps; more often costs more and, measured over eight scene
 _LOST = 1e9
 # Root mean square; differences of rates would be noise if they were smaller, and not linear if larger.
 _LEAST_PROBE, _LARGEST_PROBE = 1e-3, 1e-2
+# A step that moves the state by less than this multiple of its local error has no slope worth the name.
+_MOVES = 10.0
 
 
 class LinearizedStep(NamedTuple):
@@ -94,7 +102,7 @@ class _Deviation:
 
 
 class PropagatedError:
-    """The estimated error of the state, as a table of backward differences beside that of the state.
+    """The estimated error of the state, as tables of backward differences beside that of the state.
 
     Parameters
     ----------
@@ -102,12 +110,17 @@ class PropagatedError:
         From a state (n,) to its rate (n,).
     error : (n, 2)
         Of the state in which the integration begins: the estimate, and the one with random signs.
+    slopes : (2, n)
+        The slope of the state there, and its first backward difference.
     """
 
-    def __init__(self, rate: Callable[[Array], Array], error: Array) -> None:
+    def __init__(self, rate: Callable[[Array], Array], error: Array, slopes: Array) -> None:
         self._rate = rate
-        self._table = np.zeros((ROWS, *error.shape))
+        self._table = np.zeros((ROWS, *error.shape))  # of the errors without the leads
         self._table[0] = error
+        self._slopes = np.zeros((ROWS, len(error)))
+        self._slopes[: len(slopes)] = slopes
+        self._leads = np.zeros(2)
         self._steps = 0
         self._deviation: _Deviation | None = None
         self._random = np.random.default_rng(0)
@@ -129,6 +142,8 @@ class PropagatedError:
             deviation = None
         return {
             "table": self._table.copy(),
+            "slopes": self._slopes.copy(),
+            "leads": self._leads.copy(),
             "steps": self._steps,
             "deviation": (deviation.direction.copy(), deviation.rate.copy()) if deviation else None,
             "random": json.dumps(self._random.bit_generator.state),  # it holds integers of 128 bits
@@ -144,6 +159,7 @@ class PropagatedError:
             The same as that with which it was saved.
         """
         self._table, self._steps = saved["table"].copy(), saved["steps"]
+        self._slopes, self._leads = saved["slopes"].copy(), saved["leads"].copy()
         self._deviation = None
         if saved["deviation"]:
             direction, rate = saved["deviation"]
@@ -151,12 +167,16 @@ class PropagatedError:
             self._deviation = _Deviation(jacobian, np.stack([direction, direction], axis=1)[:, 0], rate)
         self._random.bit_generator.state = json.loads(saved["random"])
 
-    def advance(self, step: LinearizedStep, local_error: Array, remainder: Array, near: Evaluation) -> None:
+    def advance(
+        self, step: LinearizedStep, slope: Array, local_error: Array, remainder: Array, near: Evaluation
+    ) -> None:
         """Follow one step.
 
         Parameters
         ----------
         step : LinearizedStep
+        slope : (n,)
+            Of the state at the end.
         local_error : (n,)
             What the formula leaves out of its right-hand side.
         remainder : (n,)
@@ -177,10 +197,25 @@ class PropagatedError:
         if self._deviation and self._deviation.jacobian is step.jacobian:
             change = change + step.solve(step.duration * (self._deviation @ error))
         extended(table, order, change + remainder[:, None] * signs)
+        extended(self._slopes, order, slope - self._slopes[: order + 1].sum(axis=0))
+        self._separate(step.duration * root_mean_square(slope) > _MOVES * root_mean_square(local_error))
         if self._steps % _PROBED_EVERY == 0:
-            largest = np.abs(table[0]).max(axis=0)
+            largest = np.abs(self._whole(1)).max(axis=(0, 1))
             if largest.max() > _LOST:
-                table *= np.minimum(1.0, _LOST / largest)
+                part = np.minimum(1.0, _LOST / largest)
+                table *= part
+                self._leads *= part
+
+    def _separate(self, moves: bool) -> None:
+        """Count what the rest of the errors has along the slope to the leads; all to the rest without one."""
+        slope = self._slopes[0]
+        more = (slope @ self._table[0]) / (slope @ slope) if moves else -self._leads
+        self._table -= np.multiply.outer(self._slopes, more)
+        self._leads += more
+
+    def _whole(self, rows: int) -> Array:
+        """Return the first rows of the table of the errors with the leads, (rows, n, 2)."""
+        return np.asarray(self._table[:rows] + np.multiply.outer(self._slopes[:rows], self._leads))
 
     def _signs(self) -> Array:
         """Return the signs of a source, (2,)."""
@@ -213,6 +248,7 @@ class PropagatedError:
         """
         self._table[: order + 1] = combined(matrix[:, :-1], self._table[: order + 1])
         self._table[: order + 1] -= matrix[:, -1, None, None] * left_out[:, None] * self._signs()
+        self._slopes[: order + 1] = matrix[:, :-1] @ self._slopes[: order + 1]
 
     def interpolant(self, order: int, time: float, size: float) -> Callable[[float], Array]:
         """Return the error between steps; see `interpolant` of `backward_differences`.
@@ -227,4 +263,4 @@ class PropagatedError:
         -------
         callable
         """
-        return interpolant(self._table, order, time, size)
+        return interpolant(self._whole(order + 1), order, time, size)

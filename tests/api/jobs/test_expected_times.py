@@ -57,8 +57,8 @@ def test_the_ranks_of_a_study_share_its_runs(store):
     alone = expected(store, "critical-hamaker")
     assert alone is not None
     question = preset_question("critical-hamaker", {})
-    finer = sum(count for scene, count in question.planned_runs() if scene.numerics.points == 128)
-    assert alone == pytest.approx(2 * (question.cost.runs - finer) + 4 * finer)
+    finer = sum(count for scene, count in question.planned_runs() if scene.numerics.points == 96)
+    assert alone == pytest.approx(2 * (question.cost.runs - finer) + 3 * finer)
     assert expected(store, "critical-hamaker", 2) == pytest.approx(alone / 2)
 
 

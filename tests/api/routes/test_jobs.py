@@ -317,9 +317,9 @@ def test_the_estimate_is_points_times_vesicles_times_time(submitting):
     certified = submitting.post(
         "/estimate", json={"preset": "critical-hamaker", "set": {"search.certify": True}}
     ).json()
-    # Two runs at each point have twice the points: they confirm, or certify.
+    # Two runs at each point have half as many points more: they confirm, or certify.
     assert certified["runs"] == study["runs"]
-    assert study["cost"] == (study["runs"] + 2 * 6) * 64 * 2 * 6400.0
+    assert study["cost"] == (study["runs"] + 2 * 6 * 0.5) * 64 * 2 * 6400.0
     assert certified["cost"] == study["cost"]
 
 

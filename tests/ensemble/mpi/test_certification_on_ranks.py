@@ -32,7 +32,7 @@ def copied(finished: Path, store: Path) -> Path:
     """Copy a finished study without the runs that confirmed its ends: certification would take them over."""
     shutil.copytree(finished, store)
     with Store.open(store) as opened:
-        for key in runs_made(store, points=64):
+        for key in runs_made(store, points=48):
             opened.set_aside(key)
     return store
 
@@ -50,13 +50,13 @@ def certified_store(launcher, bisect_command, finished_study, tmp_path_factory) 
 def test_a_finished_study_is_certified_by_new_runs_alone(finished_study, certified_store):
     store, stdout = certified_store
     assert runs_made(store, points=32) == runs_made(finished_study.store, points=32)
-    certifying = runs_made(store, points=64)
+    certifying = runs_made(store, points=48)
     points = json.loads(stdout)["boundary"]
     assert len(certifying) >= 2 * len(points)
     for point, searched in zip(points, finished_study.document["boundary"], strict=True):
         assert point["status"] == "converged"
         assert point["certified"] is True
-        assert (point["certified_by"]["points"], point["certified_by"]["tolerance"]) == (64, 1e-4)
+        assert (point["certified_by"]["points"], point["certified_by"]["tolerance"]) == (48, 1e-5)
         assert point["outcomes"] == ["separated", "bound"]
         assert point["bracket"][0] <= searched["bracket"][0] < searched["bracket"][1] <= point["bracket"][1]
         assert len(certifying.keys() & set(point["runs"])) >= 2
@@ -65,12 +65,12 @@ def test_a_finished_study_is_certified_by_new_runs_alone(finished_study, certifi
 @pytest.mark.long
 def test_a_certified_study_runs_nothing(launcher, bisect_command, certified_store):
     store, stdout = certified_store
-    certifying = runs_made(store, points=64)
+    certifying = runs_made(store, points=48)
     again = launcher.run(2, [*bisect_command(store), "--certify"])
     assert again.returncode == 0, again.stderr
     assert certified_points(again.stdout) == certified_points(stdout)
     assert json.loads(again.stdout)["busy_fraction"] is None
-    assert runs_made(store, points=64) == certifying
+    assert runs_made(store, points=48) == certifying
 
 
 @pytest.mark.long
@@ -82,7 +82,7 @@ def test_killed_while_certifying_it_continues_to_the_same_certified_brackets(
     launched = launcher.start(2, command)
     family: list[psutil.Process] = []
     try:
-        while not runs_made(store, points=64):
+        while not runs_made(store, points=48):
             assert launched.poll() is None
             time.sleep(0.02)
         family = psutil.Process(launched.pid).children(recursive=True)
@@ -96,11 +96,11 @@ def test_killed_while_certifying_it_continues_to_the_same_certified_brackets(
         launched.kill()
         launched.wait()
 
-    kept, whole = runs_made(store, points=64), runs_made(certified_store[0], points=64)
+    kept, whole = runs_made(store, points=48), runs_made(certified_store[0], points=48)
     assert 0 < len(kept) < len(whole), "it was not killed in the middle"
     result = launcher.run(2, command)
     assert result.returncode == 0, result.stderr
     assert certified_points(result.stdout) == certified_points(certified_store[1])
-    assert kept.items() <= runs_made(store, points=64).items(), "a committed run was made again"
+    assert kept.items() <= runs_made(store, points=48).items(), "a committed run was made again"
     with Store.existing(store) as opened:
         assert opened.check() == []

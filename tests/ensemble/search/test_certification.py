@@ -132,23 +132,27 @@ def test_both_ends_are_tried_at_once_and_a_lost_end_makes_the_other_unneeded() -
     assert certifying.unneeded() == {high}
 
 
-def test_finer_means_twice_the_points_and_a_tenth_of_the_tolerance() -> None:
-    scene = load_study("critical-hamaker", ["scene.numerics.tolerance=1e-3"]).scene
+@pytest.mark.parametrize(("points", "finer"), [(64, 96), (50, 76), (16, 24)])
+def test_finer_means_half_as_many_points_more_and_a_hundredth_of_the_tolerance(
+    points: int, finer: int
+) -> None:
+    changes = [f"scene.numerics.points={points}", "scene.numerics.tolerance=1e-3"]
+    scene = load_study("critical-hamaker", changes).scene
     fine = certifying_scene(scene)
-    assert fine.numerics == Numerics(points=2 * scene.numerics.points, tolerance=1e-4)
+    assert fine.numerics == Numerics(points=finer, tolerance=1e-5)
     assert fine.model_copy(update={"numerics": scene.numerics}) == scene
 
 
 def test_points_that_the_tolerance_chooses_are_left_to_the_finer_one() -> None:
     scene = load_study("critical-hamaker", ["scene.numerics.points=auto", "search.certify=true"]).scene
     numerics = certifying_scene(scene).numerics
-    assert numerics == Numerics(points="auto", tolerance=scene.numerics.tolerance / 10)
+    assert numerics == Numerics(points="auto", tolerance=scene.numerics.tolerance / 100)
 
 
 @pytest.mark.parametrize(
     ("change", "field"),
     [
-        ("scene.numerics.points=1024", "numerics.points: 2048"),
+        ("scene.numerics.points=1024", "numerics.points: 1536"),
         ("scene.numerics.tolerance=1e-12", "numerics.tolerance"),
     ],
 )

@@ -47,7 +47,7 @@ class TwoNumerics:
 
 
 def is_finer(task: SearchRun) -> bool:
-    return task.scene.numerics.points == 128
+    return task.scene.numerics.points == 96
 
 
 def unknown(_: str) -> None:
@@ -111,7 +111,7 @@ def test_certified_points_depend_neither_on_the_workers_nor_on_the_order_of_answ
         assert max(critical, critical * physics.shift) < high
         assert point.outcomes == ("separated", "bound")
         assert (point.status, point.certified) == ("converged", True)
-        assert point.certified_by == Numerics(points=128, tolerance=1e-5)
+        assert point.certified_by == Numerics(points=96, tolerance=1e-6)
         finer_keys = {task.key for task in made if is_finer(task)}
         assert len(finer_keys.intersection(point.runs)) >= 2
 
@@ -296,8 +296,8 @@ def test_tables_name_the_numerics_and_old_documents_are_read() -> None:
         "runs": [],
     }
     old = BoundaryPoint.model_validate(document)
-    new = old.model_copy(update={"certified": True, "certified_by": Numerics(points=128, tolerance=1e-5)})
+    new = old.model_copy(update={"certified": True, "certified_by": Numerics(points=96, tolerance=1e-6)})
     assert BoundaryPoint.model_validate_json(new.model_dump_json()) == new
     columns = boundary_columns([old, new])
     shown = [dict(zip(columns, boundary_cells(p, columns), strict=True)) for p in (old, new)]
-    assert [cells["certified by"] for cells in shown] == ["–", "128 points, 1e-05"]
+    assert [cells["certified by"] for cells in shown] == ["–", "96 points, 1e-06"]

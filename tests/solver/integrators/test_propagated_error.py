@@ -66,6 +66,44 @@ def test_a_jacobian_that_is_wrong_is_seen_through() -> None:
     assert step.error(10.0)[0, 0] == pytest.approx(step.state[0] - np.exp(10.0), rel=0.4)
 
 
+SLOWEST = 0.02  # angular velocity at the angle 0; opposite to it the oscillator is 99 times as fast
+
+
+def oscillator(y: Array) -> Array:
+    """Return the slope of a motion that comes to the unit circle and turns at 1 − 0.98 cos(angle)."""
+    square = y @ y
+    fast = 1.0 - (1.0 - SLOWEST) * y[0] / np.sqrt(square)
+    return 5.0 * (1.0 - square) * y + fast * np.array([-y[1], y[0]])
+
+
+def oscillator_jacobian(y: Array) -> Array:
+    size = 1e-6
+    columns = [(oscillator(y + size * e) - oscillator(y - size * e)) / (2 * size) for e in np.eye(2)]
+    return np.stack(columns, axis=1)
+
+
+def on_the_circle(time: float) -> Array:
+    """Return the exact state from (1, 0) on, with √(1 + a) tan(angle/2) = √(1 − a) tan(√(1 − a²) t/2)."""
+    a = 1.0 - SLOWEST
+    phase = 0.5 * np.sqrt(1 - a * a) * time
+    angle = 2 * np.arctan2(np.sqrt((1 - a) / (1 + a)) * np.sin(phase), np.cos(phase))
+    return np.array([np.cos(angle), np.sin(angle)])
+
+
+@pytest.mark.parametrize("tolerance", [1e-5, 1e-6])
+def test_the_error_of_a_motion_that_repeats_itself_stays_a_lead_in_time(tolerance: float) -> None:
+    """Six turns, in each of which the lead's error of the state grows and shrinks a hundredfold; 0.3 s."""
+    end = 6 * 2 * np.pi / np.sqrt(1 - (1 - SLOWEST) ** 2)
+    problem = InitialValueProblem(
+        FunctionEquation(oscillator, oscillator_jacobian), np.array([1.0, 0.0]), 0.0, end
+    )
+    for step in all_steps(BackwardDifferentiation(problem, tolerance), end):
+        assert step.error
+        true, found = step.state - on_the_circle(step.end), step.error(step.end)[:, 0]
+        if step.end > 0.1 * end:
+            assert root_mean_square(found - true) < 0.5 * root_mean_square(true), step.end
+
+
 def lorenz(y: Array) -> Array:
     return np.array([10.0 * (y[1] - y[0]), y[0] * (28.0 - y[2]) - y[1], y[0] * y[1] - 8.0 / 3.0 * y[2]])
 
@@ -101,6 +139,16 @@ def test_the_error_of_a_pair_is_found(hamaker: float, horizon: float) -> None:
     scene = shear_pair(hamaker, horizon=horizon, numerics=Numerics(points=48))
     exact, _ = final(scene, 1e-9)
     for tolerance in (1e-4, 1e-5):
+        state, error = final(scene, tolerance)
+        true = root_mean_square(state - exact)
+        assert true / 3 < root_mean_square(error) < 3 * true
+
+
+def test_the_error_of_a_pair_that_turns_for_long_is_found() -> None:
+    """Two turns next to the critical adhesion strength; opening, the pair nearly stands still; 2 s."""
+    scene = shear_pair(0.38, horizon=500.0, numerics=Numerics(points=32))
+    exact, _ = final(scene, 1e-9)
+    for tolerance in (1e-5, 1e-6):
         state, error = final(scene, tolerance)
         true = root_mean_square(state - exact)
         assert true / 3 < root_mean_square(error) < 3 * true
