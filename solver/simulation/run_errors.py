@@ -40,7 +40,8 @@ def errors_of(scene: Scene, loop: TimeLoop, outcome: Outcome, viscosity: Viscosi
     of_answers: dict[str, float | None] = {}
     if loop.error is not None and outcome is not Outcome.FAILED:
         temporal = position_error(loop.segment.membranes, loop.state, loop.error)
-        of_answers["global_"] = float(np.hypot(temporal, recorder.spatial_position_error))
+        of_positions = float(np.hypot(temporal, recorder.spatial_position_error))
+        of_answers["global_"] = _unless_larger(of_positions, min(v.length for v in scene.vesicles))
         of_answers["inclination_angle"] = _inclination_error(scene, loop, loop.error)
         if viscosity is not None:
             error = _viscosity_error(scene, loop, loop.error, outcome)

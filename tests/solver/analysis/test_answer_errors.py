@@ -59,8 +59,7 @@ def test_an_error_larger_than_its_answer_is_unknown() -> None:
     run = run_at(1e-3, 0.38, horizon=800.0)
     assert run.sensitive
     assert run.period
-    assert run.error.global_ is not None
-    assert run.error.global_ > 10
+    assert run.error.global_ is None
     assert run.error.period is None
     assert run.error.viscosity is None
 
