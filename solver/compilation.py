@@ -24,6 +24,7 @@ import os
 import pickle
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cache, cached_property, wraps
 from pathlib import Path
 from types import CodeType, FunctionType
@@ -44,6 +45,51 @@ _LONGEST_WAIT = 120.0  # seconds for another process to compile a function, whic
 _LOOK_SECONDS = 0.02  # between two looks at whether it has
 
 _log = logging.getLogger(__name__)
+
+
+class CompiledElsewhereError(Exception):
+    """Another process is compiling a function that was called `without_waiting`.
+
+    Parameters
+    ----------
+    lock : str
+        The file that is locked meanwhile.
+    """
+
+    def __init__(self, lock: str) -> None:
+        super().__init__(lock)
+        self._lock = lock
+
+    def wait(self) -> bool:
+        """Wait until it has done so; False if that takes too long, or cannot be known.
+
+        Returns
+        -------
+        bool
+        """
+        try:
+            with open(self._lock, "rb") as file:
+                return _taken_in_time(file.fileno())
+        except OSError:
+            return False
+
+
+_waiting = True  # for what other processes compile
+_locked_functions = 0  # by this process: one, and those that it contains
+
+
+@contextmanager
+def without_waiting() -> Iterator[None]:
+    """Do not wait for another process to compile a function; what needs one raises `CompiledElsewhereError`.
+
+    In the middle of a compilation the functions that it contains are waited for nevertheless.
+    """
+    global _waiting
+    _waiting = False
+    try:
+        yield
+    finally:
+        _waiting = True
 
 
 def compiled(function: Callable[..., Any] | None = None, **options: Any) -> Any:
@@ -140,25 +186,28 @@ class _ToleratedCache(FunctionCache):
 
     def unlock(self) -> None:
         """Let other processes look, which find what has been saved."""
+        global _locked_functions
         if self._lock is not None:
             os.close(self._lock)
             self._lock = None
+            _locked_functions -= 1
 
     def _locked(self) -> bool:
         """Wait until no other process compiles this function; False if that cannot be known."""
+        global _locked_functions
         if self._lock is not None:
             return False
         try:
             self._impl.locator.ensure_cache_path()
             self._lock = os.open(self._cache_file.lock_path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
-            give_up = time.monotonic() + _LONGEST_WAIT
-            while not _taken(self._lock):
-                if time.monotonic() > give_up:
-                    return False
-                time.sleep(_LOOK_SECONDS)
+            _locked_functions += 1
+            if _taken(self._lock):
+                return True
+            if _waiting or _locked_functions > 1:
+                return _taken_in_time(self._lock)
         except OSError:
             return False
-        return True
+        raise CompiledElsewhereError(self._cache_file.lock_path)
 
     def _look(self, sig: Any, target_context: Any) -> Any:
         try:
@@ -207,6 +256,16 @@ def _taken(lock: int) -> bool:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         return False
+    return True
+
+
+def _taken_in_time(lock: int) -> bool:
+    """Take a lock when no other process has it any more, False if that takes too long."""
+    give_up = time.monotonic() + _LONGEST_WAIT
+    while not _taken(lock):
+        if time.monotonic() > give_up:
+            return False
+        time.sleep(_LOOK_SECONDS)
     return True
 
 

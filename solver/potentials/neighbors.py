@@ -50,7 +50,16 @@ def _near_distances(
         if found == 0:
             continue
         near, targets = np.empty(found), selected_points(points, target, rows[:found])
-        distances(targets, points[:, source], tangents[:, source], spacing[source], near)
+        distances(
+            targets[0],
+            targets[1],
+            points[0, source],
+            points[1, source],
+            tangents[0, source],
+            tangents[1, source],
+            spacing[source],
+            near,
+        )
         for k in range(found):
             if near[k] <= reach[pair]:
                 out[pair, rows[k]] = near[k]
@@ -156,29 +165,29 @@ def gap(geometry: Geometry, refinement: int = 4) -> float:
 
 @compiled
 def _gap_to_image(points: Array, tangents: Array, spacing: float, matrix: Array) -> float:
-    """Compute `gap` of a vesicle (2, N) and its image, with the matrix of interpolation (refinement·N, N)."""
+    """Compute `gap` of a vesicle (2, N) and its image, with the matrix of interpolation (refinement·N, N).
+
+    The distance of a point to the image is that of the opposite point to the vesicle itself.
+    """
     count, fine_count = points.shape[1], matrix.shape[0]
     refinement = fine_count // count
-    fine, image = np.empty((4, fine_count)), np.empty((4, fine_count))
+    fine, opposite, apart = np.empty((4, fine_count)), np.empty((2, fine_count)), np.empty(count)
     multiply_both(matrix, points[0], points[1], fine[0], fine[1])
     multiply_both(matrix, tangents[0], tangents[1], fine[2], fine[3])
-    for row in range(4):
-        for k in range(fine_count):
-            image[row, k] = -fine[row, k]
-    # Every refinement-th point is one of the given ones.
-    apart = np.empty(count)
-    distances(fine[:2, ::refinement], image[:2, ::refinement], image[2:, ::refinement], spacing, apart)
+    for i in range(count):
+        opposite[0, i], opposite[1, i] = -points[0, i], -points[1, i]
+    distances(opposite[0], opposite[1], points[0], points[1], tangents[0], tangents[1], spacing, apart)
     nearest = np.inf
     for i in range(count):
         nearest = min(nearest, apart[i])
     # Points that are interpolated are at most half a spacing from one that is not.
-    targets, found = np.empty((2, fine_count)), 0
+    found = 0
     for k in range(fine_count):
         if apart[(k + refinement // 2) // refinement % count] <= nearest + spacing:
-            targets[0, found], targets[1, found] = fine[0, k], fine[1, k]
+            opposite[0, found], opposite[1, found] = -fine[0, k], -fine[1, k]
             found += 1
     gaps = np.empty(found)
-    distances(targets[:, :found], image[:2], image[2:], spacing / refinement, gaps)
+    distances(opposite[0], opposite[1], fine[0], fine[1], fine[2], fine[3], spacing / refinement, gaps)
     gap = np.inf
     for k in range(found):
         gap = min(gap, gaps[k])

@@ -96,8 +96,8 @@ def join_components(components: Array, matrix: Array) -> None:
         Written to.
     """
     m = components.shape[1]
-    for block, component in ((0, 0), (1, 1), (2, 1), (3, 2)):
-        row, column = block // 2 * m, block % 2 * m
+    for block in range(4):
+        row, column, component = block // 2 * m, block % 2 * m, (block + 1) // 2  # xx, xy, xy and yy
         for i in range(m):
             joined, own = matrix[row + i, column : column + m], components[component, i, :m]
             if components.shape[2] == m:
@@ -189,39 +189,45 @@ def add_tangent_rotation(tangents: Array, forces: Array, by_state: Array) -> Non
 
 
 @compiled
-def distances(targets: Array, sources: Array, tangents: Array, spacing: float, out: Array) -> None:
+def distances(
+    target_x: Array,
+    target_y: Array,
+    x: Array,
+    y: Array,
+    tangent_x: Array,
+    tangent_y: Array,
+    spacing: float,
+    out: Array,
+) -> None:
     """Write the distance of every target to a curve, to the second order in its spacing.
 
     The curve is replaced by the tangent segment, of length ``spacing``, at its nearest point.
 
     Parameters
     ----------
-    targets : (2, m)
-    sources, tangents : (2, n)
+    target_x, target_y : (m,)
+    x, y, tangent_x, tangent_y : (n,)
         Of the curve.
     spacing : float
-        Arclength between neighboring sources.
+        Arclength between neighboring points of the curve.
     out : (m,)
         Written to.
     """
     widest_vectors()
-    # Targets in one piece of memory, and an inner loop over them: or there is no SIMD code.
-    target_x, target_y = np.empty(out.size), np.empty(out.size)
     squares, nearest = np.empty(out.size), np.empty(out.size, dtype=np.int64)
     for i in range(out.size):
-        target_x[i], target_y[i] = targets[0, i], targets[1, i]
         squares[i], nearest[i] = np.inf, 0
-    for j in range(sources.shape[1]):
-        xj, yj = sources[0, j], sources[1, j]
-        for i in range(out.size):
+    for j in range(x.size):
+        xj, yj = x[j], y[j]
+        for i in range(out.size):  # the inner loop, or there is no SIMD code
             dx, dy = target_x[i] - xj, target_y[i] - yj
             square, least = dx * dx + dy * dy, squares[i]
             squares[i] = square if square < least else least
             nearest[i] = j if square < least else nearest[i]
     for i in range(out.size):
         at = nearest[i]
-        dx, dy = target_x[i] - sources[0, at], target_y[i] - sources[1, at]
-        along = abs(dx * tangents[0, at] + dy * tangents[1, at])
+        dx, dy = target_x[i] - x[at], target_y[i] - y[at]
+        along = abs(dx * tangent_x[at] + dy * tangent_y[at])
         inside = min(along, 0.5 * spacing)
         out[i] = np.sqrt(max(squares[i] - along * along, 0.0) + (along - inside) ** 2)
 
@@ -275,7 +281,16 @@ def pair_distances(points: Array, tangents: Array, spacing: Array, out: Array) -
             if target == source:
                 own[:] = np.inf
                 continue
-            distances(points[:, target], points[:, source], tangents[:, source], spacing[source], own)
+            distances(
+                points[0, target],
+                points[1, target],
+                points[0, source],
+                points[1, source],
+                tangents[0, source],
+                tangents[1, source],
+                spacing[source],
+                own,
+            )
             for i in range(own.size):
                 own[i] /= spacing[source]
                 smallest = min(smallest, own[i])

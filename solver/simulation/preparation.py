@@ -1,17 +1,21 @@
 """Compiling what runs need, by several processes at once.
 
 Only one process compiles a function, while others that need it wait (`solver.compilation`).  If all took the
-same path they would wait all the time.  So each goes through the parts of a run in another order.
+same path they would wait all the time.  So each begins with another part of a run, and leaves one for later
+that another process is at.
 """
 
 from __future__ import annotations
 
+from collections import deque
 from contextlib import suppress
+from functools import cache, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver.analysis.diagnostics import measures
+from solver.compilation import CompiledElsewhereError, without_waiting
 from solver.integrators.backward_differences import ROWS, interpolant, rescaling
 from solver.membrane.geometry import Geometry
 from solver.membrane.inclination import inclination_by_angle
@@ -42,39 +46,60 @@ def compile_for(scene: Scene, process: int) -> None:
         return
     # What fails here fails in the run, too, which says why.
     with one_blas_thread(), suppress(ArithmeticError, np.linalg.LinAlgError):
-        parts = _parts(with_points(scene, resolution_of(scene).points))
-        first = process % len(parts)
-        for part in parts[first:] + parts[:first]:
-            part()
+        parts = deque(_parts(with_points(scene, resolution_of(scene).points)))
+        parts.rotate(-process)
+        busy = 0  # parts in a row that others are at
+        while parts:
+            try:
+                with without_waiting():
+                    parts[0]()
+            except CompiledElsewhereError as function:
+                parts.rotate(-1)
+                busy += 1
+                if busy >= len(parts) and not function.wait():
+                    return
+            else:
+                parts.popleft()
+                busy = 0
 
 
 def _parts(scene: Scene) -> list[Callable[[], object]]:
     """Return what compiles the functions of a run, in parts."""
     equation, state = dense_equation(scene), placed_state(scene)
     membranes, adhesion = equation.membranes, equation.adhesion
-    geometry = Geometry(membranes, state)
-    closeness = Closeness(geometry) if membranes.curves > 1 else None
-    scalar, vector = np.zeros_like(geometry.tangent_angle), np.zeros_like(geometry.points)
-    density = vector if adhesion else None
-    at_rest = Motion(geometry, closeness, vector, scalar, scalar, vector, density, None)
+    several = membranes.curves > 1
 
-    def measure() -> None:
-        waist_error(geometry)
-        for each in measures(scene, equation).values():
-            each(at_rest)
+    @cache
+    def geometry() -> Geometry:
+        return Geometry(membranes, state)
+
+    @cache
+    def closeness() -> Closeness:
+        return Closeness(geometry())
+
+    @cache
+    def at_rest() -> Motion:
+        scalar, vector = np.zeros_like(geometry().tangent_angle), np.zeros_like(geometry().points)
+        density = vector if adhesion else None
+        return Motion(geometry(), None, vector, scalar, scalar, vector, density, None)
 
     def follow() -> None:
-        inclination_by_angle(geometry.tangent_angle)
-        if closeness:  # several vesicles are integrated by backward differentiation
+        inclination_by_angle(membranes.tangent_angle(state))
+        if several:  # several vesicles are integrated by backward differentiation
             rescaling(1, 1.0)
             interpolant(np.zeros((ROWS, state.size)), 1, 0.0, 1.0)(0.0)
 
     parts: list[Callable[[], object]] = [
         lambda: equation.rate(state),
-        lambda: equation.linearize(at_rest, None),
-        measure,
         follow,
+        lambda: waist_error(geometry()),
+        lambda: equation.linearize(at_rest(), None),
     ]
-    if adhesion and closeness:
-        parts.append(lambda: adhesion.jacobian(geometry, closeness))
+    if adhesion and several:
+        of_adhesion = adhesion.jacobian, adhesion.energy, adhesion.density
+        parts += [partial(lambda compute: compute(geometry(), closeness()), each) for each in of_adhesion]
+    if (restoring := equation.restoring) is not None:
+        parts.append(lambda: restoring.rate(geometry()))
+    for measure in measures(scene, equation).values():
+        parts.append(partial(lambda measured: measured(at_rest()), measure))
     return parts

@@ -184,6 +184,29 @@ def test_one_of_several_processes_compiles_and_the_others_load(tmp_path: Path) -
     assert hits == ["0", "1", "1"]
 
 
+ELSEWHERE = """
+from solver.compilation import CompiledElsewhereError, without_waiting
+try:
+    with without_waiting():
+        twice(1.0)
+except CompiledElsewhereError as error:
+    print("elsewhere", end=" ")
+    assert error.wait()
+"""
+
+
+def test_a_process_may_do_something_else_while_another_one_compiles(tmp_path: Path) -> None:
+    """Two at once, 5 s: one compiles, the other one is told so and loads when it has waited."""
+    script = tmp_path / "script.py"
+    script.write_text(SLOW_SOURCE.replace("twice(1.0)\n", ELSEWHERE + "twice(1.0)\n"))
+    command = [sys.executable, "-c", f"import runpy; runpy.run_path({str(script)!r})"]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path), "NUMBA_CACHE_DIR": str(tmp_path)}
+    processes = [
+        subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) for _ in range(2)
+    ]
+    assert sorted(process.communicate()[0].strip() for process in processes) == ["0", "elsewhere 1"]
+
+
 EDITING = """
 import sys
 from pathlib import Path
