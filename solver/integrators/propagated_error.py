@@ -9,10 +9,10 @@ motion's.  So in every third step a difference of two rates shows what it does t
 the next one the Jacobian is taken to be wrong in the direction of that error only.
 
 A motion that repeats itself forgets all errors but one: how far it is ahead of the exact motion in time.
-This one stays, τ dy/dt, and grows and shrinks with the slope dy/dt by factors of hundreds.  The least of it
-that such a growth turned into another direction would look like an instability.  So it is not computed step
-by step: the lead τ is a number, and only the rest of the error, d in e = τ dy/dt + d, obeys the linearized
-equation.  After every step what d has along the slope goes to the lead.
+This one stays, τ dy/dt, and grows and shrinks with the slope dy/dt by factors of hundreds.  Computed step by
+step it would turn a little into other directions each time, and grow there like an instability.  So the lead
+τ is a number, and only the rest of the error, d in e = τ dy/dt + d, obeys the linearized equation.  After
+every step what d has along the slope goes to the lead.
 
 Local errors of opposite signs may cancel by chance, and then what is wrong with each of them does not.  So
 the same is done for a second error, whose sources have random signs: the size that it would usually have.
@@ -207,7 +207,7 @@ class PropagatedError:
                 self._leads *= part
 
     def _separate(self, moves: bool) -> None:
-        """Count what the rest of the errors has along the slope to the leads; all to the rest without one."""
+        """Move what the rest of the errors has along the slope to the leads, or the leads to the rest."""
         slope = self._slopes[0]
         more = (slope @ self._table[0]) / (slope @ slope) if moves else -self._leads
         self._table -= np.multiply.outer(self._slopes, more)
