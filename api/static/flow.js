@@ -9,13 +9,58 @@ import { get } from "./api.js";
  * @property {[number[][], number[][]]} velocity - Both components, row by row.
  */
 
+/**
+ * How strong a flow is during a run.
+ *
+ * @typedef {object} Strengths
+ * @property {number[]} times - Ascending.
+ * @property {number[]} factors - Of the velocities on the grid; the largest one is 1 or -1.
+ */
+
 /** Interpolates linearly between the positions of the grid, and goes on linearly beyond its edges. */
 export class ImposedFlow {
-  /** @param {FlowField} field */
-  constructor({ x, y, velocity }) {
+  /**
+   * @param {FlowField} field
+   * @param {Strengths | null} strengths - Null for a constant rate.
+   */
+  constructor({ x, y, velocity }, strengths = null) {
     this.x = x;
     this.y = y;
     this.velocity = velocity;
+    this.strengths = strengths;
+  }
+
+  /**
+   * The flow with the rates that a run has recorded.
+   *
+   * @param {Record<string, (number | null)[]>} series - Of the run.
+   * @param {number} rate - For which the velocities are.
+   */
+  during({ time, flow_rate: rates }, rate) {
+    if (!rates) {
+      return this;
+    }
+    const factors = rates.map((each) => Number(each) / rate);
+    const largest = Math.max(...factors.map(Math.abs)) || 1;
+    return new ImposedFlow(this, { times: time.map(Number), factors: factors.map((each) => each / largest) });
+  }
+
+  /**
+   * How strong the flow is at a time; negative while it is reversed.
+   *
+   * @param {number} time
+   */
+  strength(time) {
+    if (this.strengths === null) {
+      return 1;
+    }
+    const { times, factors } = this.strengths;
+    const after = times.findIndex((each) => each > time);
+    if (after <= 0) {
+      return factors[after === 0 ? 0 : factors.length - 1];
+    }
+    const share = (time - times[after - 1]) / (times[after] - times[after - 1]);
+    return factors[after - 1] + share * (factors[after] - factors[after - 1]);
   }
 
   /**

@@ -59,7 +59,7 @@ export class MembraneCanvas {
     const [x, y] = meanCenter(state);
     const [left, top] = [width / 2, (height - FOOT) / 2];
     context.clearRect(0, 0, width, height);
-    this.#drawFlow(width, height - FOOT, scale, [x, y]);
+    this.#drawFlow(width, height - FOOT, scale, [x, y], state.time);
     const factor = this.#refinement(state, scale);
     const outlines = state.membranes.map((membrane) => ({
       x: refined(membrane.x, factor).map((value) => left + scale * (value - x)),
@@ -139,14 +139,15 @@ export class MembraneCanvas {
   }
 
   /**
-   * Draw arrows of the flow relative to the center of the view, scaled to the fastest flow in view.
+   * Draw arrows of the flow relative to the center of the view, scaled to the fastest flow in view during the run.
    *
    * @param {number} width
    * @param {number} height
    * @param {number} scale - Pixels in the unit of length.
    * @param {[number, number]} middle - The place that is shown in the middle.
+   * @param {number} time
    */
-  #drawFlow(width, height, scale, [middleX, middleY]) {
+  #drawFlow(width, height, scale, [middleX, middleY], time) {
     const { flow } = this;
     if (flow === null) {
       return;
@@ -160,7 +161,7 @@ export class MembraneCanvas {
     const corners = [-1, 1].flatMap((side) =>
       [-1, 1].map((end) => Math.hypot(...relative((side * width) / 2, (end * height) / 2))),
     );
-    const stretch = LONGEST_ARROW / Math.max(...corners);
+    const stretch = (LONGEST_ARROW * flow.strength(time)) / Math.max(...corners);
     this.context.strokeStyle = this.style.arrows;
     this.context.lineWidth = 1.2;
     for (let row = 0; row < rows; row += 1) {

@@ -394,6 +394,21 @@ def test_a_run_is_played_with_canvas_and_plots_in_step(page: Page, url: str, run
     assert clock(page) == moment
 
 
+def test_arrows_follow_the_rate_of_the_flow(page: Page, url: str) -> None:
+    """They grow, vanish and turn round with a rate that changes; 2 s."""
+    page.goto(url)
+    strengths = page.evaluate(
+        """async () => {
+            const { ImposedFlow } = await import(document.scripts[0].src.replace('main', 'flow'));
+            const velocity = [[[0, 0], [1, 1]], [[0, 0], [0, 0]]];
+            const still = new ImposedFlow({ x: [0, 1], y: [0, 1], velocity });
+            const moving = still.during({ time: [0, 1, 2, 3], flow_rate: [0, -1, -1, 0.5] }, -0.5);
+            return [...[0, 0.5, 1, 2.5, 3, 4].map((time) => moving.strength(time)), still.strength(7)];
+        }"""
+    )
+    assert strengths == pytest.approx([0.0, 0.5, 1.0, 0.25, -0.5, -0.5, 1.0])
+
+
 def test_the_player_obeys_the_keyboard(page: Page, url: str, run_path: str, run: Run) -> None:
     times = [round(time, 1) for time in run.frames.time.tolist()]
     page.goto(url + run_path)

@@ -66,7 +66,7 @@ async function showFinishedRun({ content, parameters, query, signal }) {
     stage.append(element("p", { class: "alert" }, "This run has no recorded state that can be drawn."));
     return drawn;
   }
-  const player = new Player(frames, flow, run.scene, units, signal);
+  const player = new Player(frames, flow && flow.during(series, run.scene.flow.rate), run.scene, units, signal);
   stage.append(player.element);
   player.canvas.setAttribute("aria-label", `${describe(run.scene)}: membranes colored by tension`);
   keepTime(player, query);
