@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import platform
-from importlib.metadata import version
 from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict
 
-from ensemble.store.run_record import RESULT_PACKAGES
+from ensemble.store.versions import result_versions
 
 
 class ReportModel(BaseModel):
@@ -37,11 +36,10 @@ class Machine(ReportModel):
     @classmethod
     def here(cls) -> Machine:
         """Describe this computer."""
-        versions = {package: version(package) for package in RESULT_PACKAGES}
         return cls(
             processor=_processor(),
             system=f"{platform.system()} {platform.machine()}",
-            versions=versions | {"python": platform.python_version()},
+            versions=result_versions(),
         )
 
     def sentence(self) -> str:

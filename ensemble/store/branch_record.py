@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import platform
-from importlib.metadata import version
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ensemble.search.branch_summary import BranchPointRecord, BranchSummary, branch_key
-from ensemble.store.run_record import RESULT_PACKAGES, NamedArray
+from ensemble.store.run_record import NamedArray
+from ensemble.store.versions import result_versions
 from ensemble.timestamp import now
 from solver.revision import RESULTS_REVISION
 
@@ -32,14 +31,13 @@ def summary_of(scene: Scene, parameter: str, to: float | None, branch: SteadyBra
     -------
     BranchSummary
     """
-    versions = {package: version(package) for package in RESULT_PACKAGES}
     points, folds, crossings = (
         tuple(map(BranchPointRecord.of, part)) for part in (branch.points, branch.folds, branch.crossings)
     )
     return BranchSummary(
         key=branch_key(scene, parameter, to),
         created=now(),
-        versions=versions | {"python": platform.python_version()},
+        versions=result_versions(),
         results_revision=RESULTS_REVISION,
         scene=scene,
         parameter=parameter,

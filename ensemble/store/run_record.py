@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import json
-import platform
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields
-from importlib.metadata import version
 from typing import Annotated, Any, NamedTuple, Protocol, Self
 
 import numpy as np
@@ -14,7 +12,8 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from ensemble.config.measured import dimension_at
-from ensemble.config.run_key import DISTRIBUTION, run_key
+from ensemble.config.run_key import run_key
+from ensemble.store.versions import result_versions
 from ensemble.timestamp import Timestamp, now
 from solver.analysis.recorded import RECORDED
 from solver.analysis.run import (
@@ -33,8 +32,6 @@ from solver.analysis.run import (
 from solver.dimensions import LENGTH, TIME, Dimension
 from solver.revision import RESULTS_REVISION
 from solver.scene import Scene, Units
-
-RESULT_PACKAGES = (DISTRIBUTION, "numpy", "scipy", "numba")
 
 
 class RunSummary(BaseModel):
@@ -139,11 +136,10 @@ class RunSummary(BaseModel):
         RunSummary
         """
         results = {name: getattr(run, name) for name in RESULTS}
-        versions = {package: version(package) for package in RESULT_PACKAGES}
         return cls(
             key=run_key(run.scene),
             created=now(),
-            versions=versions | {"python": platform.python_version()},
+            versions=result_versions(),
             results_revision=RESULTS_REVISION,
             series=tuple(sorted(series)),
             vesicle_series=tuple(sorted(vesicle_series)),
