@@ -73,7 +73,7 @@ def start_from(  # numpydoc ignore=PR01
     with refusing():
         angle, offset = _radians(turn), _within_reach(shift)
         files = _are_files(sources)
-        _check_used(files, time, unit)
+        _check_used(files, time, unit, store)
         scene = _from_files(sources, document, unit) if files else _from_run(sources, document, time, store)
         placed = turned_and_shifted(scene, angle, offset).model_dump(mode="json", exclude_none=True)
         scene = validated(Scene, override(placed, dict(map(parse_override, changes))))
@@ -92,10 +92,12 @@ def _are_files(sources: list[str]) -> bool:
     return bool(files)
 
 
-def _check_used(are_files: bool, time: float | None, unit: str | None) -> None:
+def _check_used(are_files: bool, time: float | None, unit: str | None, store: Path) -> None:
     """Refuse an option that would change nothing."""
     if are_files and time is not None:
         raise ValueError("--time — is one of a stored run, and these are files")
+    if are_files and store != DEFAULT_STORE:
+        raise ValueError("--store — is that of stored runs, and these are files")
     if unit is not None and not are_files:
         raise ValueError("--unit — is that of points in files, and this is a stored run")
 

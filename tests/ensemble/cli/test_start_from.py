@@ -138,6 +138,7 @@ def test_points_in_a_unit(start_from, tmp_path: Path) -> None:
             "--unit: 'um' — a unit needs those of the scene",
         ),
         (("bean.csv", "--scene=vesicle-shear", "--time=3"), "--time — is one of a stored run"),
+        (("bean.csv", "--scene=vesicle-shear", "--store=runs"), "--store — is that of stored runs"),
         (
             ("bean.csv", "--scene=critical-hamaker"),
             "--scene: critical-hamaker is a study, and must be a scene",
