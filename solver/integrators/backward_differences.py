@@ -27,15 +27,24 @@ def extended(table: Array, order: int, difference: Array) -> None:
     Parameters
     ----------
     table : (ROWS, ...)
+        In one piece of memory.
     order : int
         Of the polynomial that was extrapolated to the new value.
     difference : (...)
         Of the new value from the extrapolated one, which is ∇ᵏ⁺¹y.
     """
-    table[order + 2] = difference - table[order + 1]
-    table[order + 1] = difference
-    for row in reversed(range(order + 1)):
-        table[row] += table[row + 1]
+    _append(table.reshape(len(table), -1), order, difference.ravel())
+
+
+@compiled
+def _append(table: Array, order: int, difference: Array) -> None:
+    """Append a value (n,) to a table (ROWS, n)."""
+    for j in range(difference.size):
+        table[order + 2, j] = difference[j] - table[order + 1, j]
+        table[order + 1, j] = difference[j]
+    for row in range(order, -1, -1):
+        for j in range(difference.size):
+            table[row, j] += table[row + 1, j]
 
 
 def rescaling(order: int, factor: float) -> Array:

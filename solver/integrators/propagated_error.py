@@ -210,12 +210,12 @@ class PropagatedError:
         """Move what the rest of the errors has along the slope to the leads, or the leads to the rest."""
         slope = self._slopes[0]
         more = (slope @ self._table[0]) / (slope @ slope) if moves else -self._leads
-        self._table -= np.multiply.outer(self._slopes, more)
+        self._table -= self._slopes[:, :, None] * more
         self._leads += more
 
     def _whole(self, rows: int) -> Array:
         """Return the first rows of the table of the errors with the leads, (rows, n, 2)."""
-        return np.asarray(self._table[:rows] + np.multiply.outer(self._slopes[:rows], self._leads))
+        return np.asarray(self._table[:rows] + self._slopes[:rows, :, None] * self._leads)
 
     def _signs(self) -> Array:
         """Return the signs of a source, (2,)."""

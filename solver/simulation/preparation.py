@@ -16,7 +16,7 @@ import numpy as np
 
 from solver.analysis.diagnostics import measures
 from solver.compilation import CompiledElsewhereError, without_waiting
-from solver.integrators.backward_differences import ROWS, interpolant, rescaling
+from solver.integrators.backward_differences import ROWS, extended, interpolant, rescaling
 from solver.membrane.geometry import Geometry
 from solver.membrane.inclination import inclination_by_angle
 from solver.motion.equation import Motion
@@ -87,7 +87,9 @@ def _parts(scene: Scene) -> list[Callable[[], object]]:
         inclination_by_angle(membranes.tangent_angle(state))
         if several:  # several vesicles are integrated by backward differentiation
             rescaling(1, 1.0)
-            interpolant(np.zeros((ROWS, state.size)), 1, 0.0, 1.0)(0.0)
+            table = np.zeros((ROWS, state.size))
+            extended(table, 1, state)
+            interpolant(table, 1, 0.0, 1.0)(0.0)
 
     parts: list[Callable[[], object]] = [
         lambda: equation.rate(state),
