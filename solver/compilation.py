@@ -118,8 +118,8 @@ def compiled(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     )(function)
     try:
         files = _ToleratedCache(function)
-    except RuntimeError as error:  # no directory can be written to
-        _say_once(str(error))
+    except RuntimeError:
+        _say_once("no directory can be written to")
         return dispatcher
     dispatcher._cache = files
     compile_or_load = dispatcher.compile

@@ -46,14 +46,21 @@ def compilation_shown(console: Console, for_program: bool = False) -> Iterator[N
 class _Lines(logging.Handler):
     def __init__(self, console: Console, for_program: bool) -> None:
         super().__init__()
-        self.addFilter(lambda record: record.levelno == logging.INFO)
         self._console = console
         self._for_program = for_program
+        self._what = "compiling what this scene needs, once on this machine"
         self._functions = 0
         self._begin = self._next = time.monotonic()
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Count a function, and print if it is the first one or some time has passed."""
+        """Count a function, and print if it is the first one or some time has passed.
+
+        A warning says that what is compiled is not kept.
+        """
+        if record.levelno > logging.INFO:
+            self._what = "compiling what this scene needs"
+            self._print(record.getMessage())
+            return
         now = time.monotonic()
         if self._functions == 0:
             self._begin = self._next = now
@@ -61,9 +68,12 @@ class _Lines(logging.Handler):
         if now < self._next:
             return
         self._next = now + REPEAT_SECONDS
-        text = "compiling what this scene needs, once on this machine"
+        text = self._what
         if self._functions > 1:
             text += f": {self._functions} functions in {now - self._begin:.0f} s so far"
+        self._print(text)
+
+    def _print(self, text: str) -> None:
         if self._for_program:
             ProgressLine(fraction=0.0, message=text, reached=0.0).print_on(self._console)
         else:

@@ -211,7 +211,10 @@ def run_queue(
             dispatcher = Dispatcher(
                 leaders, queue, whole_store(store), lambda progress: publish(queue, progress), meter, requests
             )
-            usage = dispatcher.run()
+            try:
+                usage = dispatcher.run()
+            except SystemExit as error:  # by Rich, where nobody reads; it would end this thread alone
+                raise BrokenPipeError("nobody reads how far it is") from error
             return None if usage is None else (conclude(queue), usage)
 
     result: tuple[Result, RunUsage] | None = None

@@ -11,7 +11,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout
+from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout, suppress
 from typing import TYPE_CHECKING, TypeVar
 
 from ensemble.errors import BadInput, Interrupted, told_in_a_line
@@ -281,10 +281,11 @@ def abort_guard(communicator: Intracomm | None) -> Iterator[None]:
         import traceback  # here, because signals are provided for only when this module has been imported
 
         line = told_in_a_line(error)
-        if line is None:
-            print(traceback.format_exc(), file=sys.__stderr__, flush=True)
-        else:
-            tell(line)
+        with suppress(OSError, ValueError):  # what is told nobody may read any more: that may be the error
+            if line is None:
+                print(traceback.format_exc(), file=sys.__stderr__, flush=True)
+            else:
+                tell(line)
         # The launcher stops forwarding output as soon as it hears of the end.
         time.sleep(_FORWARD_SECONDS)
         communicator.Abort(1)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from operator import itemgetter
@@ -93,7 +94,9 @@ class StudyQuestion(Question[Study]):
             scenes = [study.scene_at(at, limit) for limit in study.search.limits]
             costliest = max(scenes, key=run_work)
             yield from ((scene, searching if scene is costliest else 0) for scene in scenes)
-            yield certifying_scene(costliest), _ENDS
+            with suppress(ValueError):  # at the finest numerics nothing is confirmed
+                finer = certifying_scene(costliest)
+                yield finer, _ENDS
 
     def answer(
         self,

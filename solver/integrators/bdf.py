@@ -111,11 +111,13 @@ class BackwardDifferentiation(Remembering):
         self._slow = False
         self._solve: Callable[[Array], Array] | None = None
         error = np.zeros((problem.state.size, 2)) if problem.error is None else problem.error
-        self._error = (
-            PropagatedError(problem.equation.rate, error, np.stack([slope, self._size * acceleration]))
-            if self._jacobian.exact
-            else None
-        )
+        self._error: PropagatedError | None = None
+        if self._jacobian.exact:
+            here, before = map(self._equation.symmetries, (problem.state, problem.state - self._size * slope))
+            directions = np.stack(
+                [np.vstack([slope, here]), np.vstack([self._size * acceleration, here - before])]
+            )
+            self._error = PropagatedError(problem.equation.rate, error, directions)
 
     def saved(self) -> Saved:
         """Return the history, and the Jacobian in use; see `Remembering`.
@@ -266,7 +268,9 @@ class BackwardDifferentiation(Remembering):
             step = self._linearized()
             # By the formula itself: a rate at the end would magnify what Newton's iteration has left.
             slope = (change + step.weights @ self._table[1 : order + 1]) / step.duration
-            self._error.advance(step, slope, local_error / _ALPHA[order], solution.remainder, solution.last)
+            directions = np.vstack([slope, self._equation.symmetries(self._predicted() + change)])
+            local_error /= _ALPHA[order]
+            self._error.advance(step, directions, local_error, solution.remainder, solution.last)
         extended(self._table, order, change)
         self._equal_steps += 1
 

@@ -68,6 +68,18 @@ class DifferentialEquation(Protocol):
         Jacobian
         """
 
+    def symmetries(self, state: Array) -> Array:
+        """Return directions in which every solution may be moved, always by the same amount, and stays one.
+
+        Parameters
+        ----------
+        state : (n,)
+
+        Returns
+        -------
+        (m, n)
+        """
+
     def conserved(self, state: Array) -> Array:
         """Return quantities of order 1 that the exact solution keeps, for the step control by them.
 

@@ -8,11 +8,13 @@ The Jacobian in hand may be several steps old, and then errors grow or die out a
 motion's.  So in every third step a difference of two rates shows what it does to the error now, and until
 the next one the Jacobian is taken to be wrong in the direction of that error only.
 
-A motion that repeats itself forgets all errors but one: how far it is ahead of the exact motion in time.
-This one stays, τ dy/dt, and grows and shrinks with the slope dy/dt by factors of hundreds.  Computed step by
-step it would turn a little into other directions each time, and grow there like an instability.  So the lead
-τ is a number, and only the rest of the error, d in e = τ dy/dt + d, obeys the linearized equation.  After
-every step what d has along the slope goes to the lead.
+Some errors neither grow nor die out: how far the state is ahead of the exact motion in time, and what the
+symmetries of the equation of motion allow (`DifferentialEquation.symmetries`).  They are a number each times
+a direction that is known at all times, such as a lead τ times the slope dy/dt, which grows and shrinks by
+factors of hundreds.  Computed step by step such an error would turn a little into other directions each time,
+and grow there like an instability.  So the numbers are kept, and only the rest of the error, d in
+e = τ dy/dt + … + d, obeys the linearized equation.  After every step what d has in these directions goes to
+the numbers.
 
 Local errors of opposite signs may cancel by chance, and then what is wrong with each of them does not.  So
 the same is done for a second error, whose sources have random signs: the size that it would usually have.
@@ -28,6 +30,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from solver.compilation import compiled
 from solver.integrators.backward_differences import (
     ROWS,
     combined,
@@ -48,8 +51,9 @@ _PROBED_EVERY = 3  # steps; more often costs more and, measured over eight scene
 _LOST = 1e9
 # Root mean square; differences of rates would be noise if they were smaller, and not linear if larger.
 _LEAST_PROBE, _LARGEST_PROBE = 1e-3, 1e-2
-# A step that moves the state by less than this multiple of its local error has no slope worth the name.
+# Where a step moves the state by less than this multiple of its local error, as at rest, its slope is noise.
 _MOVES = 10.0
+_PARALLEL = 1e-6  # directions whose angle is smaller are one
 
 
 class LinearizedStep(NamedTuple):
@@ -101,6 +105,58 @@ class _Deviation:
         return np.multiply.outer(self.rate, share)
 
 
+@compiled
+def amounts_along(directions: Array, errors: Array) -> Array:
+    """Find how much of each direction is in errors, by least squares.
+
+    The last direction comes first (Gram & Schmidt), and none is taken that later ones make up.
+
+    Parameters
+    ----------
+    directions : (m, n)
+    errors : (n, 2)
+
+    Returns
+    -------
+    (m, 2)
+    """
+    count, size = directions.shape
+    apart, squares, shares = directions.copy(), np.zeros(count), np.zeros((count, count))
+    amounts = np.zeros((count, 2))
+    for k in range(count - 1, -1, -1):
+        whole = 0.0
+        for i in range(size):
+            whole += apart[k, i] ** 2
+        for other in range(count - 1, k, -1):
+            if squares[other] > 0.0:
+                for i in range(size):
+                    shares[k, other] += apart[other, i] * apart[k, i] / squares[other]
+                for i in range(size):
+                    apart[k, i] -= shares[k, other] * apart[other, i]
+        for i in range(size):
+            squares[k] += apart[k, i] ** 2
+        if squares[k] <= _PARALLEL**2 * whole:
+            squares[k] = 0.0
+    for column in range(2):
+        for k in range(count):
+            if squares[k] > 0.0:
+                for i in range(size):
+                    amounts[k, column] += apart[k, i] * errors[i, column] / squares[k]
+                for other in range(k):
+                    amounts[k, column] -= shares[other, k] * amounts[other, column]
+    return amounts
+
+
+@compiled
+def _add_along(directions: Array, amounts: Array, table: Array) -> None:
+    """Add amounts (m, 2) of directions (rows, m, n) to a table (rows, n, 2)."""
+    for row in range(table.shape[0]):
+        for k in range(amounts.shape[0]):
+            for i in range(table.shape[1]):
+                table[row, i, 0] += amounts[k, 0] * directions[row, k, i]
+                table[row, i, 1] += amounts[k, 1] * directions[row, k, i]
+
+
 class PropagatedError:
     """The estimated error of the state, as tables of backward differences beside that of the state.
 
@@ -110,17 +166,17 @@ class PropagatedError:
         From a state (n,) to its rate (n,).
     error : (n, 2)
         Of the state in which the integration begins: the estimate, and the one with random signs.
-    slopes : (2, n)
-        The slope of the state there, and its first backward difference.
+    directions : (2, 1 + m, n)
+        In which errors stay: the slope of the state, and m symmetries; and their first backward difference.
     """
 
-    def __init__(self, rate: Callable[[Array], Array], error: Array, slopes: Array) -> None:
+    def __init__(self, rate: Callable[[Array], Array], error: Array, directions: Array) -> None:
         self._rate = rate
-        self._table = np.zeros((ROWS, *error.shape))  # of the errors without the leads
+        self._table = np.zeros((ROWS, *error.shape))  # of the rest of the errors
         self._table[0] = error
-        self._slopes = np.zeros((ROWS, len(error)))
-        self._slopes[: len(slopes)] = slopes
-        self._leads = np.zeros(2)
+        self._directions = np.zeros((ROWS, *directions.shape[1:]))
+        self._directions[: len(directions)] = directions
+        self._amounts = np.zeros((directions.shape[1], 2))  # of the errors in these directions
         self._steps = 0
         self._deviation: _Deviation | None = None
         self._random = np.random.default_rng(0)
@@ -142,8 +198,8 @@ class PropagatedError:
             deviation = None
         return {
             "table": self._table.copy(),
-            "slopes": self._slopes.copy(),
-            "leads": self._leads.copy(),
+            "directions": self._directions.copy(),
+            "amounts": self._amounts.copy(),
             "steps": self._steps,
             "deviation": (deviation.direction.copy(), deviation.rate.copy()) if deviation else None,
             "random": json.dumps(self._random.bit_generator.state),  # it holds integers of 128 bits
@@ -159,7 +215,7 @@ class PropagatedError:
             The same as that with which it was saved.
         """
         self._table, self._steps = saved["table"].copy(), saved["steps"]
-        self._slopes, self._leads = saved["slopes"].copy(), saved["leads"].copy()
+        self._directions, self._amounts = saved["directions"].copy(), saved["amounts"].copy()
         self._deviation = None
         if saved["deviation"]:
             direction, rate = saved["deviation"]
@@ -168,15 +224,15 @@ class PropagatedError:
         self._random.bit_generator.state = json.loads(saved["random"])
 
     def advance(
-        self, step: LinearizedStep, slope: Array, local_error: Array, remainder: Array, near: Evaluation
+        self, step: LinearizedStep, directions: Array, local_error: Array, remainder: Array, near: Evaluation
     ) -> None:
         """Follow one step.
 
         Parameters
         ----------
         step : LinearizedStep
-        slope : (n,)
-            Of the state at the end.
+        directions : (1 + m, n)
+            Those in which errors stay, at the end.
         local_error : (n,)
             What the formula leaves out of its right-hand side.
         remainder : (n,)
@@ -197,25 +253,32 @@ class PropagatedError:
         if self._deviation and self._deviation.jacobian is step.jacobian:
             change = change + step.solve(step.duration * (self._deviation @ error))
         extended(table, order, change + remainder[:, None] * signs)
-        extended(self._slopes, order, slope - self._slopes[: order + 1].sum(axis=0))
-        self._separate(step.duration * root_mean_square(slope) > _MOVES * root_mean_square(local_error))
+        extended(self._directions, order, directions - self._directions[: order + 1].sum(axis=0))
+        moved = step.duration * root_mean_square(directions[0])
+        self._separate(moves=moved > _MOVES * root_mean_square(local_error))
         if self._steps % _PROBED_EVERY == 0:
             largest = np.abs(self._whole(1)).max(axis=(0, 1))
             if largest.max() > _LOST:
                 part = np.minimum(1.0, _LOST / largest)
                 table *= part
-                self._leads *= part
+                self._amounts *= part
 
     def _separate(self, moves: bool) -> None:
-        """Move what the rest of the errors has along the slope to the leads, or the leads to the rest."""
-        slope = self._slopes[0]
-        more = (slope @ self._table[0]) / (slope @ slope) if moves else -self._leads
-        self._table -= self._slopes[:, :, None] * more
-        self._leads += more
+        """Take what the rest of the errors has in the directions to the amounts.
+
+        Where nothing moves, the lead is given back to the rest.
+        """
+        first = 0 if moves else 1
+        more = -self._amounts
+        more[first:] = amounts_along(self._directions[0, first:], self._table[0])
+        _add_along(self._directions, -more, self._table)
+        self._amounts += more
 
     def _whole(self, rows: int) -> Array:
-        """Return the first rows of the table of the errors with the leads, (rows, n, 2)."""
-        return np.asarray(self._table[:rows] + self._slopes[:rows, :, None] * self._leads)
+        """Return the first rows of the table of the whole errors, (rows, n, 2)."""
+        whole = self._table[:rows].copy()
+        _add_along(self._directions[:rows], self._amounts, whole)
+        return whole
 
     def _signs(self) -> Array:
         """Return the signs of a source, (2,)."""
@@ -248,7 +311,7 @@ class PropagatedError:
         """
         self._table[: order + 1] = combined(matrix[:, :-1], self._table[: order + 1])
         self._table[: order + 1] -= matrix[:, -1, None, None] * left_out[:, None] * self._signs()
-        self._slopes[: order + 1] = matrix[:, :-1] @ self._slopes[: order + 1]
+        self._directions[: order + 1] = combined(matrix[:, :-1], self._directions[: order + 1])
 
     def interpolant(self, order: int, time: float, size: float) -> Callable[[float], Array]:
         """Return the error between steps; see `interpolant` of `backward_differences`.

@@ -20,7 +20,14 @@ from solver.membrane.geometry import Geometry, Membranes
 from solver.membrane.products import sum_rows
 from solver.membrane.spectral import differentiation, highest_modes, integration
 from solver.membrane.tangential_velocity import tangential_speed_by_curvature, tangential_speed_weights
-from solver.motion.equation import Motion, conserved_quantities, flow_rate, restored_motion, saved_motion
+from solver.motion.equation import (
+    Motion,
+    conserved_quantities,
+    flow_rate,
+    point_shifts,
+    restored_motion,
+    saved_motion,
+)
 from solver.motion.jacobian import DenseJacobian
 from solver.potentials.proximity import Closeness
 
@@ -187,6 +194,19 @@ class DenseEquation:
             geometry = Geometry(self.membranes, each["state"])
             motion = restored_motion(each, geometry, Closeness(geometry) if several else None)
             self._recent.append((each["state"].tobytes(), each["flow_rate"], motion))
+
+    def symmetries(self, state: Array) -> Array:
+        """Return directions in which every motion may be moved; see `EquationOfMotion`.
+
+        Parameters
+        ----------
+        state : (state_size,)
+
+        Returns
+        -------
+        (M, state_size)
+        """
+        return point_shifts(self.membranes, state)
 
     def conserved(self, state: Array) -> Array:
         """Return quantities of order 1 that the exact motion keeps; see `EquationOfMotion`.

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.compilation import compiled
-from solver.membrane.spectral import highest_modes
+from solver.membrane.spectral import differentiation, equispaced_angles, highest_modes
 from solver.membrane.tangential_velocity import add_tangential_motion
 
 if TYPE_CHECKING:
@@ -320,6 +320,19 @@ class EquationOfMotion(Protocol):
         saved : dict
         """
 
+    def symmetries(self, state: Array) -> Array:
+        """Return directions in which every motion may be moved and stays one.
+
+        Parameters
+        ----------
+        state : (state_size,)
+
+        Returns
+        -------
+        (M, state_size)
+            See `point_shifts`.
+        """
+
     def conserved(self, state: Array) -> Array:
         """Return quantities of order 1 that the exact motion keeps.
 
@@ -332,6 +345,27 @@ class EquationOfMotion(Protocol):
         (3·M,)
             See `conserved_quantities`.
         """
+
+
+def point_shifts(membranes: Membranes, state: Array) -> Array:
+    """Return what a shift of each vesicle's points along its membrane changes: nothing else than names.
+
+    Parameters
+    ----------
+    membranes : Membranes
+    state : (state_size,)
+
+    Returns
+    -------
+    (M, state_size)
+        Derivatives by the shift, in units of length/2π.
+    """
+    points = membranes.points
+    periodic = membranes.tangent_angle(state) - equispaced_angles(points)
+    shifts = np.zeros((membranes.count, membranes.state_size))
+    for vesicle, angle in enumerate(periodic):
+        shifts[vesicle, vesicle * points : (vesicle + 1) * points] = 1 + differentiation(points) @ angle
+    return shifts
 
 
 def conserved_quantities(geometry: Geometry) -> Array:

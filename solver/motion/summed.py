@@ -12,7 +12,14 @@ from numpy.typing import NDArray
 from solver.forces.summed_tension import Preconditioner, SummedInextensibility
 from solver.forces.tension import TensionInverse, TensionNotFoundError
 from solver.membrane.geometry import Geometry, Membranes
-from solver.motion.equation import Motion, conserved_quantities, flow_rate, restored_motion, saved_motion
+from solver.motion.equation import (
+    Motion,
+    conserved_quantities,
+    flow_rate,
+    point_shifts,
+    restored_motion,
+    saved_motion,
+)
 from solver.motion.jacobian import BlockDiagonal
 from solver.potentials.neighbors import Neighbors
 
@@ -211,6 +218,19 @@ class SummedEquation:
             preconditioner = Preconditioner(*saved["preconditioner"])
             state, rate = saved["last"]["state"], saved["last"]["flow_rate"]
             self._last = _Evaluation(state, rate, motion, preconditioner)
+
+    def symmetries(self, state: Array) -> Array:
+        """Return directions in which every motion may be moved; see `EquationOfMotion`.
+
+        Parameters
+        ----------
+        state : (state_size,)
+
+        Returns
+        -------
+        (M, state_size)
+        """
+        return point_shifts(self.membranes, state)
 
     def conserved(self, state: Array) -> Array:
         """Return quantities of order 1 that the exact motion keeps; see `EquationOfMotion`.

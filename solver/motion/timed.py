@@ -248,6 +248,19 @@ class TimedEquation:
         """
         self._equation.restore(saved)
 
+    def symmetries(self, state: Array) -> Array:
+        """Return directions in which every motion may be moved; see `EquationOfMotion`.
+
+        Parameters
+        ----------
+        state : (state_size + 1,)
+
+        Returns
+        -------
+        (M, state_size + 1)
+        """
+        return np.pad(self._equation.symmetries(state[:-1]), ((0, 0), (0, 1)))
+
     def conserved(self, state: Array) -> Array:
         """Return quantities of order 1 that the exact motion keeps; see `EquationOfMotion`.
 

@@ -17,6 +17,7 @@ import numpy as np
 from solver.analysis.diagnostics import measures
 from solver.compilation import CompiledElsewhereError, without_waiting
 from solver.integrators.backward_differences import ROWS, extended, interpolant, rescaling
+from solver.integrators.propagated_error import PropagatedError, amounts_along
 from solver.membrane.geometry import Geometry
 from solver.membrane.inclination import inclination_by_angle
 from solver.motion.equation import Motion
@@ -53,10 +54,10 @@ def compile_for(scene: Scene, process: int) -> None:
             try:
                 with without_waiting():
                     parts[0]()
-            except CompiledElsewhereError as function:
+            except CompiledElsewhereError as elsewhere:
                 parts.rotate(-1)
                 busy += 1
-                if busy >= len(parts) and not function.wait():
+                if busy >= len(parts) and not elsewhere.wait():
                     return
             else:
                 parts.popleft()
@@ -90,6 +91,9 @@ def _parts(scene: Scene) -> list[Callable[[], object]]:
             table = np.zeros((ROWS, state.size))
             extended(table, 1, state)
             interpolant(table, 1, 0.0, 1.0)(0.0)
+            error, directions = np.zeros((state.size, 2)), np.zeros((ROWS, 1 + membranes.count, state.size))
+            amounts_along(directions[0], error)
+            PropagatedError(equation.rate, error, directions).interpolant(1, 0.0, 1.0)
 
     parts: list[Callable[[], object]] = [
         lambda: equation.rate(state),

@@ -37,6 +37,9 @@ class FunctionEquation:
     def jacobian(self, state: Array) -> DenseJacobian:
         return DenseJacobian(self.matrix(state))
 
+    def symmetries(self, state: Array) -> Array:
+        return np.empty((0, state.size))
+
 
 class EqualSteps:
     """The control that gives all steps the same size; a step that fails is not tried again."""

@@ -16,7 +16,7 @@ import psutil
 import pytest
 
 from ensemble.questions import INCOMPLETE_STATUS
-from tests.conftest import ENSEMBLE, QUICK_STUDY
+from tests.conftest import ENSEMBLE, QUICK_STUDY, SECONDS
 from tests.ensemble.group_files import unpacked
 
 QUICK = ("vesicle-shear", "--set=horizon=1", "--set=numerics.points=32", "--set=numerics.tolerance=1e-3")
@@ -256,3 +256,16 @@ def test_output_that_nobody_reads_any_more_ends_a_command_silently(command: list
     process.stdout.close()
     assert process.stderr.read() == b""
     assert process.wait() == 1
+
+
+@pytest.mark.parametrize("nowhere", ["closed pipe", "full disk"])
+def test_a_study_whose_progress_nobody_reads_ends(nowhere: str, tmp_path: Path) -> None:
+    """Its runs are kept, and the same command goes on; 3 s each."""
+    command = [*ENSEMBLE, "bisect", *QUICK_STUDY, f"--store={tmp_path / 'store'}"]
+    with open("/dev/full", "wb") as full:
+        errors = full if nowhere == "full disk" else subprocess.PIPE
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=errors)
+        if process.stderr is not None:
+            process.stderr.readline()
+            process.stderr.close()
+        assert process.wait(SECONDS) == 1

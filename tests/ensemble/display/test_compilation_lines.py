@@ -35,6 +35,17 @@ def test_compilation_is_said_once_and_then_now_and_again(monkeypatch: pytest.Mon
     ]
 
 
+def test_it_is_said_that_nothing_is_kept() -> None:
+    printed = io.StringIO()
+    with compilation_shown(Console(file=printed)):
+        KERNELS.warning("compiled functions are not kept (%s)", "no directory can be written to")
+        KERNELS.info("compiling %s", "kernel")
+    assert printed.getvalue().splitlines() == [
+        "compiled functions are not kept (no directory can be written to)",
+        "compiling what this scene needs",
+    ]
+
+
 def test_a_program_reads_of_compilation_in_json() -> None:
     (line,) = lines_about(1, for_program=True)
     assert json.loads(line) == {

@@ -124,3 +124,10 @@ def test_summaries_of_answers() -> None:
     )
     assert scene.summary({"outcome": "bound", "failure": None}) == "bound"
     assert scene.summary({"outcome": "failed", "failure": "too distorted"}) == "too distorted"
+
+
+def test_a_study_at_the_finest_numerics_plans_no_runs_that_confirm() -> None:
+    fine = preset_question("critical-hamaker", {"scene.numerics.tolerance": 1e-11})
+    usual = preset_question("critical-hamaker", {})
+    assert {scene.numerics.tolerance for scene, _ in fine.planned_runs()} == {1e-11}
+    assert fine.cost.runs == usual.cost.runs - 2 * 6
