@@ -54,6 +54,8 @@ class _Solution(NamedTuple):
     ----------
     change : (n,)
         From the predicted state.
+    state, slope : (n,)
+        At the end of the step, by the formula: a rate would magnify what Newton's iteration has left.
     remainder : (n,)
         Estimated error of the change.
     iterations : int
@@ -63,6 +65,8 @@ class _Solution(NamedTuple):
     """
 
     change: Array
+    state: Array
+    slope: Array
     remainder: Array
     iterations: int
     convergence: float
@@ -247,7 +251,15 @@ class BackwardDifferentiation(Remembering):
                 return None
             remaining = quotient / (1 - quotient)
             if remaining * size < _NEWTON_TOLERANCE:
-                return _Solution(change, -remaining * correction, iteration + 1, quotient, evaluation)
+                return _Solution(
+                    change=change,
+                    state=predicted + change,
+                    slope=(change + history) / step.duration,
+                    remainder=-remaining * correction,
+                    iterations=iteration + 1,
+                    convergence=quotient,
+                    last=evaluation,
+                )
         return None
 
     def _evaluated(self, state: Array) -> Evaluation | None:
@@ -265,12 +277,11 @@ class BackwardDifferentiation(Remembering):
             local_error = _ERROR[order] * change
             if self._equal_steps > 0:  # the next term of its expansion
                 local_error += (change - self._table[order + 1]) / (order + 2)
-            step = self._linearized()
-            # By the formula itself: a rate at the end would magnify what Newton's iteration has left.
-            slope = (change + step.weights @ self._table[1 : order + 1]) / step.duration
-            directions = np.vstack([slope, self._equation.symmetries(self._predicted() + change)])
             local_error /= _ALPHA[order]
-            self._error.advance(step, directions, local_error, solution.remainder, solution.last)
+            directions = np.vstack([solution.slope, self._equation.symmetries(solution.state)])
+            self._error.advance(
+                self._linearized(), directions, local_error, solution.remainder, solution.last
+            )
         extended(self._table, order, change)
         self._equal_steps += 1
 
