@@ -46,3 +46,21 @@ def certifying_scene(scene: Scene) -> Scene:
         return scene.model_copy(update={"numerics": validated(Numerics, document)})
     except ValueError as error:
         raise ValueError(f"to certify, numerics.{error}") from error
+
+
+def can_be_certified(scene: Scene) -> bool:
+    """Return whether there are finer numerics than those of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Returns
+    -------
+    bool
+    """
+    try:
+        certifying_scene(scene)
+    except ValueError:
+        return False
+    return True

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from operator import itemgetter
@@ -13,7 +12,7 @@ from pathlib import Path
 from statistics import fmean
 from typing import TYPE_CHECKING, Any
 
-from ensemble.config.certifying_scene import certifying_scene
+from ensemble.config.certifying_scene import can_be_certified, certifying_scene
 from ensemble.config.study import Study
 from ensemble.questions.cost import run_work
 from ensemble.questions.question import Answer, Question, StoredAnswer, StoredAnswers, where_kept
@@ -94,9 +93,8 @@ class StudyQuestion(Question[Study]):
             scenes = [study.scene_at(at, limit) for limit in study.search.limits]
             costliest = max(scenes, key=run_work)
             yield from ((scene, searching if scene is costliest else 0) for scene in scenes)
-            with suppress(ValueError):  # at the finest numerics nothing is confirmed
-                finer = certifying_scene(costliest)
-                yield finer, _ENDS
+            if can_be_certified(costliest):
+                yield certifying_scene(costliest), _ENDS
 
     def answer(
         self,

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from ensemble.config.certifying_scene import certifying_scene
+from ensemble.config.certifying_scene import can_be_certified, certifying_scene
 from ensemble.config.study import Study
 from ensemble.search.boundary import BoundaryPoint, Confirmed, OutcomeChange, Scanned
 from ensemble.search.certification import Certification, CertificationResult
@@ -235,7 +235,8 @@ class StudyPoint:
         search, confirmation = self._search.search, self._confirmation.search
         while search.done:
             for value in search.ends_of_changes - confirmation.values:
-                if self._search.answer_at(value).sensitive and self._can_be_finer(value):
+                scene = self._study.scene_at(self._at, value)
+                if self._search.answer_at(value).sensitive and can_be_certified(scene):
                     confirmation.add(value)
                     self._confirmation.take_known(value)
             contrary = {
@@ -244,14 +245,6 @@ class StudyPoint:
             if not (contrary and confirmation.done):
                 return
             search.revise(contrary)
-
-    def _can_be_finer(self, value: float) -> bool:
-        """Return whether there are finer numerics than those of the run at a value."""
-        try:
-            self._finer_scene(value)
-        except ValueError:
-            return False
-        return True
 
     def _finer_scene(self, value: float) -> Scene:
         return certifying_scene(self._study.scene_at(self._at, value))
