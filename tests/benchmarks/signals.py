@@ -37,7 +37,6 @@ from tests.api.processes import alive
 MARK = "ENSEMBLE_SIGNAL_FAMILY"
 HANG_SECONDS = 120.0
 LEFT_SECONDS = 2.0  # after which no process may be left
-RACE_SECONDS = 1.0  # a job that succeeds within them after its signal was at its end anyway
 EARLIEST, START, LATEST = 0.1, 3.0, 9.0  # seconds after the start; half of the signals fall into the start
 
 STUDY = (
@@ -176,9 +175,10 @@ class Job:
 
     @property
     def answer(self) -> dict[str, Any] | None:
-        """What it has printed, once that is whole.  A launcher may print of a signal after it."""
+        """What it has printed, once that is whole.  A launcher may print of a signal before it and after."""
+        _, brace, rest = self._printed.read_text().partition("{\n")
         try:
-            answer, _ = json.JSONDecoder().raw_decode(self._printed.read_text())
+            answer, _ = json.JSONDecoder().raw_decode(brace + rest)
         except json.JSONDecodeError:
             return None
         return dict(answer)
@@ -238,17 +238,16 @@ class Series:
             time.sleep(plan.moment)
             known = _keys(self._store)
             hit = job.send(plan, self._chance)
+            made_before = _keys(self._store)
             seconds = job.wait() if hit else self._let_finish(job)
             left = [part_of(process, job.launcher.pid) for process in job.members()]
         finally:
             job.end()
         status = job.launcher.returncode
-        had_ended = status == 0 or job.answer is not None
-        # A job whose runs were all made has nothing to stop; on a busy machine its end takes long.
-        nothing_left = _keys(self._store) == known
-        late = had_ended and seconds is not None and (seconds < RACE_SECONDS or nothing_left)
-        if not hit or late:
-            if had_ended:
+        # A job that was in the last steps of its last runs, one at a time on each rank, had nothing to stop.
+        nothing_left = len(_keys(self._store) - made_before) <= max(plan.ranks, 1)
+        if not hit or (job.answer is not None and seconds is not None and nothing_left):
+            if status == 0 or job.answer is not None:
                 self._complete(job)
             return None
         made = Try(plan, HANG_SECONDS if seconds is None else seconds, status, job.said, left)
@@ -257,7 +256,7 @@ class Series:
             self.ignored += 1
         else:
             self.tries.append(made)
-        if status == 0:
+        if job.answer is not None:
             self._complete(job)
         return made
 
@@ -304,6 +303,8 @@ def _faults(made: Try, has_answered: bool) -> list[str]:
         faults.append("more than one line")
     if has_answered and made.status != 0:
         faults.append("printed")
+    if made.status == 0 and not has_answered:
+        faults.append("nothing printed")
     return faults
 
 
