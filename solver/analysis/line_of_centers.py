@@ -181,7 +181,9 @@ class LineOfCenters(RevolutionTracker):
         return math.atan2(y, x)
 
     def _offset(self, state: Array) -> list[float]:
-        x, y = self.membranes.center(state).T.tolist()
-        if len(x) == 1:  # the other vesicle is the image
-            return [-2 * x[0], -2 * y[0]]
-        return [x[1] - x[0], y[1] - y[0]]
+        first = self.membranes.count * self.membranes.points
+        if self.membranes.count == 1:  # the other vesicle is the image
+            x, y = state[first : first + 2].tolist()
+            return [-2 * x, -2 * y]
+        x, other_x, y, other_y = state[first : first + 4].tolist()
+        return [other_x - x, other_y - y]

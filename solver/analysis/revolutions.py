@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-_NODES = np.cos(np.pi * np.arange(5) / 4)  # Chebyshev's, on [-1, 1]
+_NODES = np.cos(np.pi * np.arange(5) / 4).tolist()  # Chebyshev's, on [-1, 1]
 _COEFFICIENTS = np.linalg.inv(np.vander(_NODES, increasing=True))  # of the polynomial through values at them
 _ROUND_OFF = 1e-6  # half turns
 _FOLLOWED = np.pi / 8  # turn of a tangent through which a line is followed at once, well below a quarter turn
@@ -118,7 +118,7 @@ class RevolutionTracker(Remembering, ABC):
 
     def _stand(self) -> None:
         """Take the angle as that of any time: no step has been followed."""
-        self._times, self._angles = np.zeros(1), np.array([self.angle])
+        self._times, self._angles = [0.0], [self.angle]
         self._states: list[Array] = []  # at these times
 
     def count_from_here(self) -> None:
@@ -227,7 +227,7 @@ class RevolutionTracker(Remembering, ABC):
             angles.append(self._unwrapped(state, angles[-1]))
             states.append(state)
             tangents = turned
-        self._times, self._angles, self._states = np.array(times), np.array(angles), states
+        self._times, self._angles, self._states = times, angles, states
         self.angle = angles[-1]
 
     def _unwrapped(self, state: Array, near: float) -> float:
@@ -254,19 +254,19 @@ def extremes(
     -------
     (float, float)
     """
-    times = 0.5 * (first + last) + 0.5 * (last - first) * _NODES
-    values = np.array([quantity(step.interpolate(time)) for time in times])
-    return -_greatest(-values), _greatest(values)
-
-
-def _greatest(values: Array) -> float:
-    """Return the maximum of the polynomial through values at the nodes."""
-    if np.argmax(values) in (0, _NODES.size - 1):
-        return float(values.max())
+    middle, half = 0.5 * (first + last), 0.5 * (last - first)
+    values = [quantity(step.interpolate(middle + half * node)) for node in _NODES]
+    least, most, ends = min(values), max(values), (values[0], values[-1])
+    if least in ends and most in ends:
+        return least, most
     polynomial = Polynomial(_COEFFICIENTS @ values)
     extremes = polynomial.deriv().roots()
-    inside = extremes[np.isreal(extremes) & (np.abs(extremes) < 1)].real
-    return float(max(values.max(), *polynomial(inside)))
+    inside = polynomial(extremes[np.isreal(extremes) & (np.abs(extremes) < 1)].real).tolist()
+    if least not in ends:
+        least = min([least, *inside])
+    if most not in ends:
+        most = max([most, *inside])
+    return least, most
 
 
 def crossing(step: Step, excess: Callable[[Array, float], float]) -> float:

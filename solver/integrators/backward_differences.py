@@ -21,24 +21,40 @@ MAX_ORDER = 5
 ROWS = MAX_ORDER + 3  # the order may rise by one, for which one difference more is estimated
 
 
-def extended(table: Array, order: int, difference: Array) -> None:
+@compiled
+def extrapolate(table: Array, weights: Array, value: Array, history: Array) -> None:
+    """Write what a table says of the next value.
+
+    Parameters
+    ----------
+    table : (ROWS, n)
+    weights : (k,)
+        Of the rows from the first difference on; their number is the order of the polynomial.
+    value : (n,), written
+        The polynomial, extrapolated by a step.
+    history : (n,), written
+        The sum of the weighted rows.
+    """
+    for j in range(value.size):
+        value[j], history[j] = table[0, j], 0.0
+    for row in range(weights.size):
+        for j in range(value.size):
+            value[j] += table[row + 1, j]
+            history[j] += weights[row] * table[row + 1, j]
+
+
+@compiled
+def append(table: Array, order: int, difference: Array) -> None:
     """Append a value to a table, in place.
 
     Parameters
     ----------
-    table : (ROWS, ...)
-        In one piece of memory.
+    table : (ROWS, n)
     order : int
         Of the polynomial that was extrapolated to the new value.
-    difference : (...)
+    difference : (n,)
         Of the new value from the extrapolated one, which is ∇ᵏ⁺¹y.
     """
-    _append(table.reshape(len(table), -1), order, difference.ravel())
-
-
-@compiled
-def _append(table: Array, order: int, difference: Array) -> None:
-    """Append a value (n,) to a table (ROWS, n)."""
     for j in range(difference.size):
         table[order + 2, j] = difference[j] - table[order + 1, j]
         table[order + 1, j] = difference[j]

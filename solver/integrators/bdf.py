@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from solver.integrators.backward_differences import (
     MAX_ORDER,
     ROWS,
-    extended,
+    append,
+    extrapolate,
     interpolant,
     rescaling,
 )
@@ -34,7 +35,8 @@ Array = NDArray[np.float64]
 _KAPPA = np.array([0.0, -0.1850, -1 / 9, -0.0823, -0.0415, 0.0])
 _GAMMA = np.array([sum(1 / m for m in range(1, k + 1)) for k in range(MAX_ORDER + 1)])
 _ALPHA = (1 - _KAPPA) * _GAMMA
-_ERROR = _KAPPA * _GAMMA + 1 / np.arange(1, MAX_ORDER + 2)
+_ERROR = (_KAPPA * _GAMMA + 1 / np.arange(1, MAX_ORDER + 2)).tolist()
+_WEIGHTS = [_GAMMA[1 : k + 1] / _ALPHA[k] for k in range(MAX_ORDER + 1)]  # of the differences, over (1 − κ) γ
 
 # Newton's iteration stops when its error is this fraction of the step's tolerance.
 _NEWTON_TOLERANCE = 0.1
@@ -117,11 +119,10 @@ class BackwardDifferentiation(Remembering):
         error = np.zeros((problem.state.size, 2)) if problem.error is None else problem.error
         self._error: PropagatedError | None = None
         if self._jacobian.exact:
-            here, before = map(self._equation.symmetries, (problem.state, problem.state - self._size * slope))
-            directions = np.stack(
-                [np.vstack([slope, here]), np.vstack([self._size * acceleration, here - before])]
-            )
-            self._error = PropagatedError(problem.equation.rate, error, directions)
+            change = self._size * slope
+            now = self._directions(slope, problem.state)
+            before = self._directions(slope - self._size * acceleration, problem.state - change)
+            self._error = PropagatedError(problem.equation.rate, error, np.stack([now, now - before]))
 
     def saved(self) -> Saved:
         """Return the history, and the Jacobian in use; see `Remembering`.
@@ -186,7 +187,7 @@ class BackwardDifferentiation(Remembering):
         self._accept(solution)
         self._choose(excess, safety)
         state = self._table[0].copy()
-        if not np.all(np.isfinite(state)):
+        if not math.isfinite(state @ state):
             raise StepFailedError("the state is no longer finite")
         history = self._order, end, self._size
         return Step(
@@ -212,15 +213,18 @@ class BackwardDifferentiation(Remembering):
     def _renew(self) -> bool:
         """Compute the Jacobian where the step is expected to end, and return whether there is one."""
         try:
-            self._jacobian = self._equation.jacobian(self._predicted())
+            self._jacobian = self._equation.jacobian(self._extrapolated()[0])
         except ArithmeticError:
             return False
         self.jacobian_evaluations += 1
         self._solve = None
         return True
 
-    def _predicted(self) -> Array:
-        return np.asarray(self._table[: self._order + 1].sum(axis=0))
+    def _extrapolated(self) -> Array:
+        """Return the state that is expected at the end of the step, and Σₘ wₘ ∇ᵐy, (2, n)."""
+        extrapolated = np.empty((2, self._table.shape[1]))
+        extrapolate(self._table, _WEIGHTS[self._order], *extrapolated)
+        return extrapolated
 
     def _linearized(self) -> LinearizedStep:
         """Return the formula of the present order and step size."""
@@ -229,21 +233,21 @@ class BackwardDifferentiation(Remembering):
         if self._solve is None:
             self._solve = self._jacobian.solver(duration)
             self.factorizations += 1
-        weights = _GAMMA[1 : order + 1] / _ALPHA[order]
-        return LinearizedStep(order, weights, duration, self._jacobian, self._solve)
+        return LinearizedStep(order, _WEIGHTS[order], duration, self._jacobian, self._solve)
 
     def _newton(self, step: LinearizedStep) -> _Solution | None:
         """Return the solution of the formula, None if the iteration does not converge."""
-        predicted, history = self._predicted(), step.weights @ self._table[1 : step.order + 1]
-        change, last_size = np.zeros_like(predicted), np.inf
+        predicted, history = self._extrapolated()
+        state, change, last_size = predicted, np.zeros_like(predicted), math.inf
         for iteration in range(_NEWTON_ITERATIONS):
-            evaluation = self._evaluated(predicted + change)
+            evaluation = self._evaluated(state)
             if evaluation is None:
                 return None
             correction = step.solve(step.duration * evaluation.rate - history - change)
             size = root_mean_square(correction) / self._tolerance
             quotient, last_size = size / last_size, size
             change = change + correction
+            state = predicted + change
             if iteration == 0 and size > 0:
                 continue
             left = _NEWTON_ITERATIONS - iteration
@@ -253,7 +257,7 @@ class BackwardDifferentiation(Remembering):
             if remaining * size < _NEWTON_TOLERANCE:
                 return _Solution(
                     change=change,
-                    state=predicted + change,
+                    state=state,
                     slope=(change + history) / step.duration,
                     remainder=-remaining * correction,
                     iterations=iteration + 1,
@@ -278,12 +282,19 @@ class BackwardDifferentiation(Remembering):
             if self._equal_steps > 0:  # the next term of its expansion
                 local_error += (change - self._table[order + 1]) / (order + 2)
             local_error /= _ALPHA[order]
-            directions = np.vstack([solution.slope, self._equation.symmetries(solution.state)])
+            directions = self._directions(solution.slope, solution.state)
             self._error.advance(
                 self._linearized(), directions, local_error, solution.remainder, solution.last
             )
-        extended(self._table, order, change)
+        append(self._table, order, change)
         self._equal_steps += 1
+
+    def _directions(self, slope: Array, state: Array) -> Array:
+        """Return the directions in which an error stays, (1 + m, n)."""
+        symmetries = self._equation.symmetries(state)
+        directions = np.empty((1 + len(symmetries), slope.size))
+        directions[0], directions[1:] = slope, symmetries
+        return directions
 
     def _choose(self, excess: float, safety: float) -> None:
         """Choose order and size of the next step, once there are enough equal steps to compare."""

@@ -5,8 +5,8 @@ obeys the linearized equation of motion with these as its source.  The same form
 steps and the matrix in hand.
 
 The Jacobian in hand may be several steps old, and then errors grow or die out at another rate than the
-motion's.  So in every third step a difference of two rates shows what it does to the error now, and until
-the next one the Jacobian is taken to be wrong in the direction of that error only.
+motion's.  So in every third step with it a difference of two rates shows what it does to the error now, and
+until the next one the Jacobian is taken to be wrong in the direction of that error only.
 
 Some errors neither grow nor die out: how far the state is ahead of the exact motion in time, and what the
 symmetries of the equation of motion allow (`DifferentialEquation.symmetries`).  They are a number each times
@@ -22,7 +22,7 @@ the same is done for a second error, whose sources have random signs: the size t
 
 from __future__ import annotations
 
-import json
+import random
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
@@ -33,8 +33,9 @@ from numpy.typing import NDArray
 from solver.compilation import compiled
 from solver.integrators.backward_differences import (
     ROWS,
+    append,
     combined,
-    extended,
+    extrapolate,
     interpolant,
 )
 from solver.integrators.control import root_mean_square
@@ -45,7 +46,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-_PROBED_EVERY = 3  # steps; more often costs more and, measured over eight scenes, gains nothing
+_PROBED_EVERY = 3  # steps with a Jacobian; more often costs more and, measured over 60 scenes, gains nothing
 # Far beyond every state: an error as large says that nothing is known.  In a motion that never repeats
 # itself it would go on to grow until it overflows.
 _LOST = 1e9
@@ -54,6 +55,7 @@ _LEAST_PROBE, _LARGEST_PROBE = 1e-3, 1e-2
 # Where a step moves the state by less than this multiple of its local error, as at rest, its slope is noise.
 _MOVES = 10.0
 _PARALLEL = 1e-6  # directions whose angle is smaller are one
+_SIGNS = random.Random(0).choices((1.0, -1.0), k=4096)
 
 
 class LinearizedStep(NamedTuple):
@@ -106,7 +108,7 @@ class _Deviation:
 
 
 @compiled
-def amounts_along(directions: Array, errors: Array) -> Array:
+def amounts_along(directions: Array, errors: Array, first: int = 0) -> Array:
     """Find how much of each direction is in errors, by least squares.
 
     The last direction comes first (Gram & Schmidt), and none is taken that later ones make up.
@@ -115,6 +117,8 @@ def amounts_along(directions: Array, errors: Array) -> Array:
     ----------
     directions : (m, n)
     errors : (n, 2)
+    first : int
+        Directions before it are left out.
 
     Returns
     -------
@@ -123,7 +127,7 @@ def amounts_along(directions: Array, errors: Array) -> Array:
     count, size = directions.shape
     apart, squares, shares = directions.copy(), np.zeros(count), np.zeros((count, count))
     amounts = np.zeros((count, 2))
-    for k in range(count - 1, -1, -1):
+    for k in range(count - 1, first - 1, -1):
         whole = 0.0
         for i in range(size):
             whole += apart[k, i] ** 2
@@ -138,23 +142,100 @@ def amounts_along(directions: Array, errors: Array) -> Array:
         if squares[k] <= _PARALLEL**2 * whole:
             squares[k] = 0.0
     for column in range(2):
-        for k in range(count):
+        for k in range(first, count):
             if squares[k] > 0.0:
                 for i in range(size):
                     amounts[k, column] += apart[k, i] * errors[i, column] / squares[k]
-                for other in range(k):
+                for other in range(first, k):
                     amounts[k, column] -= shares[other, k] * amounts[other, column]
     return amounts
 
 
 @compiled
-def _add_along(directions: Array, amounts: Array, table: Array) -> None:
-    """Add amounts (m, 2) of directions (rows, m, n) to a table (rows, n, 2)."""
+def add_along(directions: Array, amounts: Array, table: Array) -> None:
+    """Add parts of directions to a table of errors.
+
+    Parameters
+    ----------
+    directions : (rows, m, n)
+    amounts : (m, 2)
+        Of each direction, by error.
+    table : (rows, n, 2), changed
+    """
     for row in range(table.shape[0]):
         for k in range(amounts.shape[0]):
             for i in range(table.shape[1]):
                 table[row, i, 0] += amounts[k, 0] * directions[row, k, i]
                 table[row, i, 1] += amounts[k, 1] * directions[row, k, i]
+
+
+@compiled
+def complete_source(
+    duration: float, local_error: Array, sign: float, history: Array, right_side: Array
+) -> None:
+    """Turn the rates of both errors into the right-hand sides of their steps, in place.
+
+    Parameters
+    ----------
+    duration : float
+        See `LinearizedStep`.
+    local_error : (n,)
+        The source of the first error.
+    sign : float
+        With which it is that of the second one.
+    history : (n, 2)
+        What the table of the errors contributes.
+    right_side : (n, 2), changed
+        Rates on entry.
+    """
+    for i in range(local_error.size):
+        first, second = duration * right_side[i, 0], duration * right_side[i, 1]
+        right_side[i, 0] = first + local_error[i] - history[i, 0]
+        right_side[i, 1] = second + sign * local_error[i] - history[i, 1]
+
+
+@compiled
+def end_step(
+    order: int,
+    change: Array,
+    latest: Array,
+    first: int,
+    table: Array,
+    directions: Array,
+    amounts: Array,
+) -> None:
+    """Enter what a step does to errors and directions into their tables, and separate the one from the other.
+
+    Parameters
+    ----------
+    order : int
+        Of the formula.
+    change : (n, 2)
+        Of the errors, from what was predicted.
+    latest : (m, n)
+        The directions at the end of the step.
+    first : int
+        From this direction on, what errors have in one goes to its amount.  Those before it have no part in
+        the motion now; their amounts are given back to the errors.
+    table : (ROWS, n, 2), changed
+    directions : (ROWS, m, n), changed
+    amounts : (m, 2), changed
+    """
+    rows, count, size = directions.shape
+    append(table.reshape(rows, 2 * size), order, change.reshape(2 * size))
+    difference = latest.copy()
+    for row in range(order + 1):
+        for k in range(count):
+            for i in range(size):
+                difference[k, i] -= directions[row, k, i]
+    append(directions.reshape(rows, count * size), order, difference.reshape(count * size))
+    found = amounts_along(directions[0], table[0], first)
+    more = np.empty((count, 2))
+    for k in range(count):
+        for column in range(2):
+            more[k, column] = amounts[k, column] if k < first else -found[k, column]
+            amounts[k, column] -= more[k, column]
+    add_along(directions, more, table)
 
 
 class PropagatedError:
@@ -177,9 +258,10 @@ class PropagatedError:
         self._directions = np.zeros((ROWS, *directions.shape[1:]))
         self._directions[: len(directions)] = directions
         self._amounts = np.zeros((directions.shape[1], 2))  # of the errors in these directions
-        self._steps = 0
-        self._deviation: _Deviation | None = None
-        self._random = np.random.default_rng(0)
+        self._jacobian: Jacobian | None = None  # of the last step
+        self._age = 0  # steps with it
+        self._deviation: _Deviation | None = None  # what it leaves out
+        self._sources = 0  # so far
 
     def saved(self, jacobian: Jacobian) -> Saved:
         """Return what decides the errors to come.
@@ -193,16 +275,14 @@ class PropagatedError:
         -------
         dict
         """
-        deviation = self._deviation
-        if deviation and deviation.jacobian is not jacobian:
-            deviation = None
+        deviation = self._deviation if self._jacobian is jacobian else None
         return {
             "table": self._table.copy(),
             "directions": self._directions.copy(),
             "amounts": self._amounts.copy(),
-            "steps": self._steps,
+            "age": self._age if self._jacobian is jacobian else 0,
             "deviation": (deviation.direction.copy(), deviation.rate.copy()) if deviation else None,
-            "random": json.dumps(self._random.bit_generator.state),  # it holds integers of 128 bits
+            "sources": self._sources,
         }
 
     def restore(self, saved: Saved, jacobian: Jacobian) -> None:
@@ -214,14 +294,13 @@ class PropagatedError:
         jacobian : Jacobian
             The same as that with which it was saved.
         """
-        self._table, self._steps = saved["table"].copy(), saved["steps"]
+        self._table, self._sources = saved["table"].copy(), saved["sources"]
         self._directions, self._amounts = saved["directions"].copy(), saved["amounts"].copy()
+        self._jacobian, self._age = jacobian, saved["age"]
         self._deviation = None
         if saved["deviation"]:
             direction, rate = saved["deviation"]
-            # A column in memory, as the error is that was probed: its products are then the same to the bit.
-            self._deviation = _Deviation(jacobian, np.stack([direction, direction], axis=1)[:, 0], rate)
-        self._random.bit_generator.state = json.loads(saved["random"])
+            self._deviation = _Deviation(jacobian, direction, rate)
 
     def advance(
         self, step: LinearizedStep, directions: Array, local_error: Array, remainder: Array, near: Evaluation
@@ -240,49 +319,59 @@ class PropagatedError:
         near : Evaluation
             Close to the accepted state.
         """
-        table, order = self._table, step.order
-        predicted = table[: order + 1].sum(axis=0)
-        history = combined(step.weights, table[1 : order + 1])
-        signs = self._signs()
-        source = local_error[:, None] * signs - history
-        change = step.solve(step.duration * (step.jacobian @ predicted) + source)
-        error = predicted + change
-        self._steps += 1
-        if self._steps % _PROBED_EVERY == 0:
-            self._deviation = self._probe(step.jacobian, error[:, 0], near)
-        if self._deviation and self._deviation.jacobian is step.jacobian:
-            change = change + step.solve(step.duration * (self._deviation @ error))
-        extended(table, order, change + remainder[:, None] * signs)
-        extended(self._directions, order, directions - self._directions[: order + 1].sum(axis=0))
+        predicted, history = np.empty((2, *self._table.shape[1:]))
+        extrapolate(self._flat, step.weights, predicted.ravel(), history.ravel())
+        sign, right_side = self._sign(), step.jacobian @ predicted
+        complete_source(step.duration, local_error, sign, history, right_side)
+        change = step.solve(right_side)
+        self._grow_older(step.jacobian)
+        if self._age % _PROBED_EVERY == 0:
+            self._deviation = self._probe(step.jacobian, predicted[:, 0] + change[:, 0], near)
+        if self._deviation:
+            change = change + step.solve(step.duration * (self._deviation @ (predicted + change)))
         moved = step.duration * root_mean_square(directions[0])
-        self._separate(moves=moved > _MOVES * root_mean_square(local_error))
-        if self._steps % _PROBED_EVERY == 0:
-            largest = np.abs(self._whole(1)).max(axis=(0, 1))
-            if largest.max() > _LOST:
-                part = np.minimum(1.0, _LOST / largest)
-                table *= part
-                self._amounts *= part
+        entered = np.multiply.outer(remainder, (1.0, sign))
+        entered += change
+        end_step(
+            step.order,
+            entered,
+            directions,
+            0 if moved > _MOVES * root_mean_square(local_error) else 1,
+            self._table,
+            self._directions,
+            self._amounts,
+        )
+        if self._age % _PROBED_EVERY == 0:
+            self._limit()
 
-    def _separate(self, moves: bool) -> None:
-        """Take what the rest of the errors has in the directions to the amounts.
+    @property
+    def _flat(self) -> Array:
+        return self._table.reshape(len(self._table), -1)
 
-        Where nothing moves, the lead is given back to the rest.
-        """
-        first = 0 if moves else 1
-        more = -self._amounts
-        more[first:] = amounts_along(self._directions[0, first:], self._table[0])
-        _add_along(self._directions, -more, self._table)
-        self._amounts += more
+    def _grow_older(self, jacobian: Jacobian) -> None:
+        """Count the steps with a Jacobian."""
+        if jacobian is not self._jacobian:
+            self._jacobian, self._age, self._deviation = jacobian, 0, None
+        self._age += 1
+
+    def _limit(self) -> None:
+        """Keep errors that say nothing from growing until they overflow."""
+        largest = np.abs(self._whole(1)).max(axis=(0, 1))
+        if largest.max() > _LOST:
+            part = np.minimum(1.0, _LOST / largest)
+            self._table *= part
+            self._amounts *= part
 
     def _whole(self, rows: int) -> Array:
         """Return the first rows of the table of the whole errors, (rows, n, 2)."""
         whole = self._table[:rows].copy()
-        _add_along(self._directions[:rows], self._amounts, whole)
+        add_along(self._directions[:rows], self._amounts, whole)
         return whole
 
-    def _signs(self) -> Array:
-        """Return the signs of a source, (2,)."""
-        return np.array([1.0, 2.0 * self._random.integers(2) - 1.0])
+    def _sign(self) -> float:
+        """Return the sign of a source of the second error."""
+        self._sources += 1
+        return _SIGNS[self._sources % len(_SIGNS)]
 
     def _probe(self, jacobian: Jacobian, error: Array, near: Evaluation) -> _Deviation | None:
         size = root_mean_square(error)
@@ -310,7 +399,8 @@ class PropagatedError:
             ∇ᵏ⁺¹y of the state, in the old step size.
         """
         self._table[: order + 1] = combined(matrix[:, :-1], self._table[: order + 1])
-        self._table[: order + 1] -= matrix[:, -1, None, None] * left_out[:, None] * self._signs()
+        lost = np.multiply.outer(left_out, (1.0, self._sign()))
+        self._table[: order + 1] -= matrix[:, -1, None, None] * lost
         self._directions[: order + 1] = combined(matrix[:, :-1], self._directions[: order + 1])
 
     def interpolant(self, order: int, time: float, size: float) -> Callable[[float], Array]:

@@ -24,7 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.compilation import compiled
-from solver.membrane.spectral import differentiation, equispaced_angles, highest_modes
+from solver.membrane.products import multiply
+from solver.membrane.spectral import differentiation, highest_modes
 from solver.membrane.tangential_velocity import add_tangential_motion
 
 if TYPE_CHECKING:
@@ -360,12 +361,23 @@ def point_shifts(membranes: Membranes, state: Array) -> Array:
     (M, state_size)
         Derivatives by the shift, in units of length/2π.
     """
-    points = membranes.points
-    periodic = membranes.tangent_angle(state) - equispaced_angles(points)
     shifts = np.zeros((membranes.count, membranes.state_size))
-    for vesicle, angle in enumerate(periodic):
-        shifts[vesicle, vesicle * points : (vesicle + 1) * points] = 1 + differentiation(points) @ angle
+    _write_shifts(membranes.tangent_angle(state), differentiation(membranes.points), shifts)
     return shifts
+
+
+@compiled
+def _write_shifts(tangent_angle: Array, derivative: Array, shifts: Array) -> None:
+    """Write `point_shifts`: 1 plus the derivative of what is periodic in the tangent angles."""
+    count, points = tangent_angle.shape
+    periodic = np.empty(points)
+    for vesicle in range(count):
+        for j in range(points):
+            periodic[j] = tangent_angle[vesicle, j] - 2.0 * np.pi * j / points
+        own = shifts[vesicle, vesicle * points : (vesicle + 1) * points]
+        multiply(derivative, periodic, own)
+        for j in range(points):
+            own[j] += 1.0
 
 
 def conserved_quantities(geometry: Geometry) -> Array:

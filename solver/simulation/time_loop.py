@@ -302,7 +302,8 @@ class TimeLoop(Remembering):
         return bool(self.tracker.passages) if self.tracker else step.end > self._scene.horizon / 2
 
     def _decide(self) -> Outcome:
-        decisions = (criterion.decide(self._history) for criterion in self._criteria)
+        history = self._history
+        decisions = (criterion.decide(history) for criterion in self._criteria)
         return next((outcome for outcome in decisions if outcome), Outcome.UNDECIDED)
 
     def _examined(self) -> Rest:
@@ -316,7 +317,8 @@ class TimeLoop(Remembering):
         """Why the run is undecided, as far as its criteria say."""
         if self.outcome is not Outcome.UNDECIDED:
             return None
-        lacking = (criterion.lacking(self._history) for criterion in self._criteria)
+        history = self._history
+        lacking = (criterion.lacking(history) for criterion in self._criteria)
         return "; ".join(reason for reason in lacking if reason) or None
 
     @property
