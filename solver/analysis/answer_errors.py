@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -36,6 +36,7 @@ class _Sample(NamedTuple):
     time: float
     state: Array
     error: Array  # (state_size, 2), see `Step`
+    slope: Array  # of the state, over the step
 
 
 class AnswerErrors(Remembering):
@@ -100,13 +101,14 @@ class AnswerErrors(Remembering):
             if len(self._samples) < _MOST_SAMPLES // 4:
                 self._every = max(self._every // 2, 1)
         error = step.error(step.end)
-        if tracker.passages:  # what was before the first one is in no turn
-            self._keep(_Sample(self._steps, step.end, step.state, error))
+        motion, duration = step.state - step.interpolate(step.start), step.end - step.start
+        if tracker.passages and duration > 0:  # what was before the first one is in no turn
+            self._keep(_Sample(self._steps, step.end, step.state, error, motion / duration))
         self._steps += 1
         self._size = step.state.size
         if isinstance(tracker, LineOfCenters):
             self._follow_distance(step, error, tracker)
-            self.sensitive |= _transverse_error(step, error[:, 0]) > _LARGEST_TRANSVERSE
+            self.sensitive |= _transverse_error(error[:, 0], motion) > _LARGEST_TRANSVERSE
 
     @property
     def period(self) -> float | None:
@@ -142,21 +144,34 @@ class AnswerErrors(Remembering):
         numbers = np.array([s.number for s in inside])
         wanted = numbers[0] + np.linspace(0, numbers[-1] - numbers[0], _SAMPLES).astype(int)
         chosen = [inside[k] for k in np.unique(np.searchsorted(numbers, wanted))]
+        leads = self._leads([s.time for s in chosen])
+        others = [s.error - np.multiply.outer(s.slope, lead) for s, lead in zip(chosen, leads, strict=True)]
         values = np.array([quantity(s.state) for s in chosen])
-        changes = np.array([change_of(quantity, s.state, s.error) for s in chosen])
+        changes = np.array(
+            [change_of(quantity, s.state, other) for s, other in zip(chosen, others, strict=True)]
+        )
         if not np.all(np.isfinite(changes)):
             return np.inf
         times = np.array([first, *(s.time for s in chosen), last])
-        duration = last - first
-        # Columns: the value, and its two errors.
+        # To the first and the last of them belong the values next to them.
         columns = np.column_stack([values, changes])
         columns = np.vstack([columns[:1], columns, columns[-1:]])
-        mean, *change = np.trapezoid(columns, times, axis=0) / duration
-        # The turn of the trajectory y − e begins and ends at other times.
-        shifts = (values[-1] - mean) * self._at_passages[-1] - (values[0] - mean) * self._at_passages[-3]
-        # What only delays the motion cancels in an average, but not to the last digit.
+        mean, *change = np.trapezoid(columns, times, axis=0) / (last - first)
+        # A lead changes an average as far as it changes in the turn, which is that of the trajectory y − e.
+        apart = 0.5 * (columns[1:, 0] + columns[:-1, 0]) - mean
+        change = change - apart @ np.diff(self._leads(times), axis=0) / (last - first)
+        # Errors of opposite signs cancel in an average, but not to the last digit.
         rest = _REST * float(np.abs(changes[:, 0]).mean())
-        return float(np.hypot(magnitude(change + shifts / duration), rest))
+        return float(np.hypot(magnitude(change), rest))
+
+    def _leads(self, times: Sequence[float] | Array) -> Array:
+        """Return how far ahead in time the errors put the run at times (n,) of the last turn, (n, 2).
+
+        It is known at the passages, and taken to change linearly from one to the next.
+        """
+        assert self._tracker is not None
+        passages, late = self._tracker.passages[-3:], np.transpose(self._at_passages)
+        return -np.column_stack([np.interp(times, passages, each) for each in late])
 
     def _keep(self, sample: _Sample) -> None:
         if sample.number % self._every == 0:
@@ -216,9 +231,8 @@ def _time_error(step: Step, time: float, quantity: Quantity) -> Array:
     return -change_of(quantity, state, step.error(time)) / rate if rate else np.full(2, np.inf)
 
 
-def _transverse_error(step: Step, error: Array) -> float:
-    """Return an error (n,) at the end of a step without what only delays or hastens the motion."""
-    motion = step.state - step.interpolate(step.start)
+def _transverse_error(error: Array, motion: Array) -> float:
+    """Return the root mean square of an error (n,) without what only delays or hastens the motion (n,)."""
     if (square := motion @ motion) > 0:
         error = error - (error @ motion) / square * motion
     return root_mean_square(error)
