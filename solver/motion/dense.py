@@ -334,8 +334,11 @@ class DenseEquation:
 
     def _known(self, state: Array) -> Motion | None:
         """Return the motion in a state in which steps have evaluated it lately, with the present flow."""
-        wanted = state.tobytes(), flow_rate(self.flow)
-        return next((motion for *known, motion in self._recent if tuple(known) == wanted), None)
+        wanted = state.tobytes()
+        for known, rate, motion in self._recent:
+            if known == wanted and rate == flow_rate(self.flow):
+                return motion
+        return None
 
     def _assemble(self, geometry: Geometry) -> Closeness | None:
         """Fill the matrices for a geometry, unless they are filled for it already."""
