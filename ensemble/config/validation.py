@@ -19,7 +19,7 @@ Validated = TypeVar("Validated")
 SomeModel = TypeVar("SomeModel", bound=BaseModel)
 
 # What pydantic says in words of Python.
-_WORDS = {"tuple_type": "must be a list"}
+_WORDS = {"tuple_type": "must be a list", "union_tag_not_found": "needs a kind"}
 
 
 @overload

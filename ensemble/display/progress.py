@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from datetime import timedelta
 from itertools import count
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console, Group
@@ -35,6 +36,8 @@ if TYPE_CHECKING:
 
     from ensemble.mpi.dispatcher import JobProgress
     from ensemble.mpi.run_study import Snapshot
+
+_BETWEEN_LINES = 10.0  # seconds; a shorter run is not worth a line in a log
 
 # A context manager that gives a function to call whenever something has changed.
 Display = AbstractContextManager[Callable[..., None]]
@@ -160,7 +163,7 @@ def run_lines(console: Console) -> Iterator[Callable[[float, float], None]]:
 
 @contextmanager
 def run_progress(console: Console) -> Iterator[Callable[[float, float], None]]:
-    """Give a function that shows a bar for a simulation; it shows nothing unless on a terminal.
+    """Give a function that shows a bar for a simulation, or off a terminal a line every ten seconds.
 
     Parameters
     ----------
@@ -173,7 +176,15 @@ def run_progress(console: Console) -> Iterator[Callable[[float, float], None]]:
         Takes the time that the simulation has reached and its latest end.
     """
     if not console.is_terminal:
-        yield lambda time, end: None
+        shown = monotonic()
+
+        def show(time: float, end: float) -> None:
+            nonlocal shown
+            if monotonic() - shown >= _BETWEEN_LINES:
+                shown = monotonic()
+                console.print(f"time {time:g} of {end:g}", soft_wrap=True, highlight=False)
+
+        yield show
         return
     with Progress(console=console, transient=True) as progress, told_above(console):
         bar = progress.add_task("simulating")

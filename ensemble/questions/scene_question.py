@@ -223,10 +223,15 @@ class SceneQuestion(Question[Scene]):
             column_of(path, RUN_FIELDS, heading)._replace(width=SHORT_KEY if path == "key" else None)
             for heading, path in _COLUMNS.items()
         ]
-        sorted_by = [] if listing.sort is None else [listing.sort.removeprefix("-")]
-        asked = dict.fromkeys([*compared_fields(listing.where), *sorted_by])
-        more = [path for path in asked if path not in _COLUMNS.values()]
-        shown = columns_of(columns, RUN_FIELDS) or (*usual, *columns_of(more, RUN_FIELDS))
+        asked = dict.fromkeys(compared_fields(listing.where), "where")
+        if listing.sort is not None:
+            asked.setdefault(listing.sort.removeprefix("-"), "sort")
+        more = [
+            column_of(path, RUN_FIELDS, asked=by)
+            for path, by in asked.items()
+            if path not in _COLUMNS.values()
+        ]
+        shown = columns_of(columns, RUN_FIELDS) or (*usual, *more)
         return StoredAnswers((json.loads(record.json) for record in store.run_records(listing)), shown)
 
 

@@ -25,7 +25,7 @@ class ListColumn(NamedTuple):
     width: int | None = None
 
 
-def column_of(path: str, fields: Fields, heading: str | None = None) -> ListColumn:
+def column_of(path: str, fields: Fields, heading: str | None = None, asked: str = "columns") -> ListColumn:
     """Return the column that shows a field.
 
     Parameters
@@ -36,6 +36,8 @@ def column_of(path: str, fields: Fields, heading: str | None = None) -> ListColu
         The fields with which a path may begin.
     heading : str, optional
         Left out, the path.
+    asked : str
+        What asks for the field, for messages.
 
     Returns
     -------
@@ -46,7 +48,7 @@ def column_of(path: str, fields: Fields, heading: str | None = None) -> ListColu
     StoreInputError
         If there is no such field.
     """
-    location = field_at(path, fields, "columns").location
+    location = field_at(path, fields, asked).location
     return ListColumn(path if heading is None else heading, lambda document: _shown(document, location))
 
 

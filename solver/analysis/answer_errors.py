@@ -25,7 +25,7 @@ _SAFETY = 3.0  # factor within which an estimated error is trusted
 _SAMPLES = 16  # of a turn; what is averaged over it is smooth
 _FEWEST_SAMPLES = 4
 _MOST_SAMPLES = 1024  # that are kept to choose from; of a longer turn every other step, or fewer
-_REST = 0.2  # share of the errors at single instants that an average keeps
+_REST = 0.1  # share of the errors at single instants that an average keeps
 _LARGEST = 1e-2  # root mean square of the error of a state with which quantities change linearly
 _LARGEST_TRANSVERSE = 0.1  # root mean square; the pair may be on the way to another state
 _PART = 1e-3  # of a step, over which a quantity is taken to change linearly
@@ -36,7 +36,7 @@ class _Sample(NamedTuple):
     time: float
     state: Array
     error: Array  # (state_size, 2), see `Step`
-    slope: Array  # of the state, over the step
+    slope: Array  # of the state
 
 
 class AnswerErrors(Remembering):
@@ -101,14 +101,15 @@ class AnswerErrors(Remembering):
             if len(self._samples) < _MOST_SAMPLES // 4:
                 self._every = max(self._every // 2, 1)
         error = step.error(step.end)
-        motion, duration = step.state - step.interpolate(step.start), step.end - step.start
-        if tracker.passages and duration > 0:  # what was before the first one is in no turn
-            self._keep(_Sample(self._steps, step.end, step.state, error, motion / duration))
+        part = _PART * (step.end - step.start)
+        if tracker.passages and part > 0:  # what was before the first one is in no turn
+            slope = (step.state - step.interpolate(step.end - part)) / part
+            self._keep(_Sample(self._steps, step.end, step.state, error, slope))
         self._steps += 1
         self._size = step.state.size
         if isinstance(tracker, LineOfCenters):
             self._follow_distance(step, error, tracker)
-            self.sensitive |= _transverse_error(error[:, 0], motion) > _LARGEST_TRANSVERSE
+            self.sensitive |= _transverse_error(step, error[:, 0]) > _LARGEST_TRANSVERSE
 
     @property
     def period(self) -> float | None:
@@ -138,8 +139,8 @@ class AnswerErrors(Remembering):
         if self.period is None or self._tracker is None:
             return None
         first, last = self._tracker.passages[-3], self._tracker.passages[-1]
-        inside = [s for s in self._samples if first <= s.time <= last and s.state.size == self._size]
-        if len(inside) < _FEWEST_SAMPLES:
+        inside = [sample for sample in self._samples if first <= sample.time <= last]
+        if len(inside) < _FEWEST_SAMPLES or any(sample.state.size != self._size for sample in inside):
             return None
         numbers = np.array([s.number for s in inside])
         wanted = numbers[0] + np.linspace(0, numbers[-1] - numbers[0], _SAMPLES).astype(int)
@@ -231,8 +232,9 @@ def _time_error(step: Step, time: float, quantity: Quantity) -> Array:
     return -change_of(quantity, state, step.error(time)) / rate if rate else np.full(2, np.inf)
 
 
-def _transverse_error(error: Array, motion: Array) -> float:
-    """Return the root mean square of an error (n,) without what only delays or hastens the motion (n,)."""
+def _transverse_error(step: Step, error: Array) -> float:
+    """Return an error (n,) at the end of a step without what only delays or hastens the motion."""
+    motion = step.state - step.interpolate(step.start)
     if (square := motion @ motion) > 0:
         error = error - (error @ motion) / square * motion
     return root_mean_square(error)

@@ -122,7 +122,8 @@ class BackwardDifferentiation(Remembering):
             change = self._size * slope
             now = self._directions(slope, problem.state)
             before = self._directions(slope - self._size * acceleration, problem.state - change)
-            self._error = PropagatedError(problem.equation.rate, error, np.stack([now, now - before]))
+            directions = np.stack([now, now - before])
+            self._error = PropagatedError(problem.equation.rate, error, directions, problem.start)
 
     def saved(self) -> Saved:
         """Return the history, and the Jacobian in use; see `Remembering`.

@@ -5,8 +5,9 @@ obeys the linearized equation of motion with these as its source.  The same form
 steps and the matrix in hand.
 
 The Jacobian in hand may be several steps old, and then errors grow or die out at another rate than the
-motion's.  So in every third step with it a difference of two rates shows what it does to the error now, and
-until the next one the Jacobian is taken to be wrong in the direction of that error only.
+motion's.  In the first two steps with it, it is taken as it is.  In every third one a difference of two rates
+shows what it does to the error now, and until the next one the Jacobian is taken to be wrong in the direction
+of that error only.
 
 Some errors neither grow nor die out: how far the state is ahead of the exact motion in time, and what the
 symmetries of the equation of motion allow (`DifferentialEquation.symmetries`).  They are a number each times
@@ -55,7 +56,6 @@ _LEAST_PROBE, _LARGEST_PROBE = 1e-3, 1e-2
 # Where a step moves the state by less than this multiple of its local error, as at rest, its slope is noise.
 _MOVES = 10.0
 _PARALLEL = 1e-6  # directions whose angle is smaller are one
-_SIGNS = random.Random(0).choices((1.0, -1.0), k=4096)
 
 
 class LinearizedStep(NamedTuple):
@@ -203,7 +203,7 @@ def end_step(
     table: Array,
     directions: Array,
     amounts: Array,
-) -> None:
+) -> tuple[float, float]:
     """Enter what a step does to errors and directions into their tables, and separate the one from the other.
 
     Parameters
@@ -220,6 +220,11 @@ def end_step(
     table : (ROWS, n, 2), changed
     directions : (ROWS, m, n), changed
     amounts : (m, 2), changed
+
+    Returns
+    -------
+    (float, float)
+        The largest element of each of the whole errors.
     """
     rows, count, size = directions.shape
     append(table.reshape(rows, 2 * size), order, change.reshape(2 * size))
@@ -236,6 +241,15 @@ def end_step(
             more[k, column] = amounts[k, column] if k < first else -found[k, column]
             amounts[k, column] -= more[k, column]
     add_along(directions, more, table)
+    first_largest = second_largest = 0.0
+    for i in range(size):
+        first_whole, second_whole = table[0, i, 0], table[0, i, 1]
+        for k in range(count):
+            first_whole += amounts[k, 0] * directions[0, k, i]
+            second_whole += amounts[k, 1] * directions[0, k, i]
+        first_largest = max(first_largest, abs(first_whole))
+        second_largest = max(second_largest, abs(second_whole))
+    return first_largest, second_largest
 
 
 class PropagatedError:
@@ -249,10 +263,14 @@ class PropagatedError:
         Of the state in which the integration begins: the estimate, and the one with random signs.
     directions : (2, 1 + m, n)
         In which errors stay: the slope of the state, and m symmetries; and their first backward difference.
+    begin : float
+        When the integration begins.  The signs depend on it: parts of a run that begin alike draw others.
     """
 
-    def __init__(self, rate: Callable[[Array], Array], error: Array, directions: Array) -> None:
-        self._rate = rate
+    def __init__(
+        self, rate: Callable[[Array], Array], error: Array, directions: Array, begin: float = 0.0
+    ) -> None:
+        self._rate, self._begin = rate, begin
         self._table = np.zeros((ROWS, *error.shape))  # of the rest of the errors
         self._table[0] = error
         self._directions = np.zeros((ROWS, *directions.shape[1:]))
@@ -261,7 +279,7 @@ class PropagatedError:
         self._jacobian: Jacobian | None = None  # of the last step
         self._age = 0  # steps with it
         self._deviation: _Deviation | None = None  # what it leaves out
-        self._sources = 0  # so far
+        self._random, self._sources = random.Random(begin), 0
 
     def saved(self, jacobian: Jacobian) -> Saved:
         """Return what decides the errors to come.
@@ -294,7 +312,10 @@ class PropagatedError:
         jacobian : Jacobian
             The same as that with which it was saved.
         """
-        self._table, self._sources = saved["table"].copy(), saved["sources"]
+        self._table = saved["table"].copy()
+        self._random, self._sources = random.Random(self._begin), 0
+        while self._sources < saved["sources"]:
+            self._sign()
         self._directions, self._amounts = saved["directions"].copy(), saved["amounts"].copy()
         self._jacobian, self._age = jacobian, saved["age"]
         self._deviation = None
@@ -332,7 +353,7 @@ class PropagatedError:
         moved = step.duration * root_mean_square(directions[0])
         entered = np.multiply.outer(remainder, (1.0, sign))
         entered += change
-        end_step(
+        largest = end_step(
             step.order,
             entered,
             directions,
@@ -341,8 +362,10 @@ class PropagatedError:
             self._directions,
             self._amounts,
         )
-        if self._age % _PROBED_EVERY == 0:
-            self._limit()
+        if max(largest) > _LOST:  # it would grow until it overflows
+            part = _LOST / np.maximum(largest, _LOST)
+            self._table *= part
+            self._amounts *= part
 
     @property
     def _flat(self) -> Array:
@@ -354,14 +377,6 @@ class PropagatedError:
             self._jacobian, self._age, self._deviation = jacobian, 0, None
         self._age += 1
 
-    def _limit(self) -> None:
-        """Keep errors that say nothing from growing until they overflow."""
-        largest = np.abs(self._whole(1)).max(axis=(0, 1))
-        if largest.max() > _LOST:
-            part = np.minimum(1.0, _LOST / largest)
-            self._table *= part
-            self._amounts *= part
-
     def _whole(self, rows: int) -> Array:
         """Return the first rows of the table of the whole errors, (rows, n, 2)."""
         whole = self._table[:rows].copy()
@@ -371,7 +386,7 @@ class PropagatedError:
     def _sign(self) -> float:
         """Return the sign of a source of the second error."""
         self._sources += 1
-        return _SIGNS[self._sources % len(_SIGNS)]
+        return 1.0 if self._random.random() < 0.5 else -1.0  # it draws the same in every version of Python
 
     def _probe(self, jacobian: Jacobian, error: Array, near: Evaluation) -> _Deviation | None:
         size = root_mean_square(error)

@@ -77,9 +77,8 @@ class Revolved(Criterion):
         assert line
         found = convergence(line.cycle)
         if line.half_turns < 2 * criteria.revolutions or not found:
-            return (
-                f"the pair has made {line.half_turns / 2:g} full turns since it first stood across the flow"
-            )
+            turns = "1 full turn" if line.half_turns == 2 else f"{line.half_turns / 2:g} full turns"
+            return f"the pair has made {turns} since it first stood across the flow"
         change = min(each.change for each in found)
         return (
             f"the motion has not settled: after {line.half_turns / 2:g} full turns it still changes by "

@@ -324,7 +324,7 @@ def test_query_finds_what_meets_the_conditions(ensemble, finished_study):
     ]
     refused = ensemble("query", "runs", "--where=no_such_field=1", store)
     assert refused.returncode == 2
-    assert "no_such_field" in refused.stderr
+    assert "where: unknown field 'no_such_field'" in refused.stderr
 
 
 def test_query_sorts_limits_and_shows_the_columns_that_are_asked_for(ensemble, finished_study):
@@ -338,10 +338,10 @@ def test_query_sorts_limits_and_shows_the_columns_that_are_asked_for(ensemble, f
     strongest = sorted((run["scene"]["adhesion"]["hamaker"] for run in every), reverse=True)[:2]
     assert [row[:2] for row in rows] == [[f"{hamaker:.6g}", "0.9"] for hamaker in strongest]
     assert "more than 2; --limit 0" in found.stderr
-    for option in ("--columns=flow.rat", "--sort=flow.rat"):
-        refused = ensemble("query", "runs", store, option)
+    for option in ("columns", "sort"):
+        refused = ensemble("query", "runs", store, f"--{option}=flow.rat")
         assert refused.returncode == 2
-        assert "flow.rat" in refused.stderr
+        assert f"{option}: unknown field 'flow.rat'" in refused.stderr
 
 
 def test_tables_are_for_people(ensemble, finished_study, stored_run):

@@ -117,6 +117,9 @@ def test_locations_of_a_path() -> None:
             "vesicles.0.reduced_area: 1.2 — input should be less than or equal to 1",
         ),
         ({"horizon": -3}, "horizon: -3 — input should be greater than 0"),
+        ({"horizon": True}, "horizon should not be true or false"),
+        ({"vesicles.0.center": [False, 0.0]}, "vesicles.0: center should not be true or false"),
+        ({"flow": {"rate": 1.0}}, "flow: needs a kind"),
         (
             {"numerics.points": 8},
             "numerics.points: 8 — input should be greater than or equal to 16, or input should be 'auto'",

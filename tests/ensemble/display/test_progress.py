@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from io import StringIO
 
+import pytest
 from rich.console import Console
 from rich.text import Text
 
@@ -29,8 +30,11 @@ def test_what_is_told_stands_above_a_live_display(capsys) -> None:
     assert capsys.readouterr().err == "", "outside of a display the process's own stream is used"
 
 
-def test_a_run_that_is_shown_as_plain_text_shows_nothing() -> None:
+def test_a_run_in_a_log_has_a_line_now_and_then(monkeypatch: pytest.MonkeyPatch) -> None:
     output = StringIO()
     with run_progress(Console(file=output, width=80)) as show:
         show(1.0, 2.0)
-    assert output.getvalue() == ""
+        assert output.getvalue() == "", "a short run has none"
+        monkeypatch.setattr("ensemble.display.progress._BETWEEN_LINES", 0.0)
+        show(1.5, 2.0)
+    assert output.getvalue() == "time 1.5 of 2\n"

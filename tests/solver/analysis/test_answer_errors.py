@@ -37,7 +37,7 @@ def test_period_and_viscosity_of_a_pair_that_stays_together() -> None:
     assert not run.sensitive
 
 
-@pytest.mark.parametrize("tolerance", [1e-5, 1e-6])
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-5, 1e-6])
 def test_a_lead_in_time_is_no_error_of_an_average(tolerance: float) -> None:
     """Next to the critical strength, 0.36, a pair hesitates, and leads grow and shrink a hundredfold."""
     run, truth = (run_at(each, 0.4, horizon=500.0) for each in (tolerance, 1e-8))
@@ -45,7 +45,7 @@ def test_a_lead_in_time_is_no_error_of_an_average(tolerance: float) -> None:
     assert truth.viscosity
     assert run.error.viscosity
     error = abs(run.viscosity.total - truth.viscosity.total)
-    assert error / FACTOR < run.error.viscosity < 50 * error
+    assert error / FACTOR < run.error.viscosity < 20 * error
 
 
 def test_time_of_separation() -> None:
