@@ -195,30 +195,16 @@ def complete_source(
 
 
 @compiled
-def end_step(
-    order: int,
-    change: Array,
-    latest: Array,
-    first: int,
-    table: Array,
-    directions: Array,
-    amounts: Array,
-) -> tuple[float, float]:
-    """Enter what a step does to errors and directions into their tables, and separate the one from the other.
+def separate(first: int, table: Array, directions: Array, amounts: Array) -> tuple[float, float]:
+    """Take to the amounts what errors have in the directions.
 
     Parameters
     ----------
-    order : int
-        Of the formula.
-    change : (n, 2)
-        Of the errors, from what was predicted.
-    latest : (m, n)
-        The directions at the end of the step.
     first : int
-        From this direction on, what errors have in one goes to its amount.  Those before it have no part in
-        the motion now; their amounts are given back to the errors.
+        The first direction in which that is done.  Those before it have no part in the motion now; their
+        amounts are given back to the errors.
     table : (ROWS, n, 2), changed
-    directions : (ROWS, m, n), changed
+    directions : (ROWS, m, n)
     amounts : (m, 2), changed
 
     Returns
@@ -226,14 +212,7 @@ def end_step(
     (float, float)
         The largest element of each of the whole errors.
     """
-    rows, count, size = directions.shape
-    append(table.reshape(rows, 2 * size), order, change.reshape(2 * size))
-    difference = latest.copy()
-    for row in range(order + 1):
-        for k in range(count):
-            for i in range(size):
-                difference[k, i] -= directions[row, k, i]
-    append(directions.reshape(rows, count * size), order, difference.reshape(count * size))
+    count, size = directions.shape[1:]
     found = amounts_along(directions[0], table[0], first)
     more = np.empty((count, 2))
     for k in range(count):
@@ -250,6 +229,11 @@ def end_step(
         first_largest = max(first_largest, abs(first_whole))
         second_largest = max(second_largest, abs(second_whole))
     return first_largest, second_largest
+
+
+def _flat(table: Array) -> Array:
+    """Return a view of a table whose rows are vectors."""
+    return table.reshape(len(table), -1)
 
 
 class PropagatedError:
@@ -341,7 +325,7 @@ class PropagatedError:
             Close to the accepted state.
         """
         predicted, history = np.empty((2, *self._table.shape[1:]))
-        extrapolate(self._flat, step.weights, predicted.ravel(), history.ravel())
+        extrapolate(_flat(self._table), step.weights, predicted.ravel(), history.ravel())
         sign, right_side = self._sign(), step.jacobian @ predicted
         complete_source(step.duration, local_error, sign, history, right_side)
         change = step.solve(right_side)
@@ -353,23 +337,16 @@ class PropagatedError:
         moved = step.duration * root_mean_square(directions[0])
         entered = np.multiply.outer(remainder, (1.0, sign))
         entered += change
-        largest = end_step(
-            step.order,
-            entered,
-            directions,
-            0 if moved > _MOVES * root_mean_square(local_error) else 1,
-            self._table,
-            self._directions,
-            self._amounts,
-        )
+        append(_flat(self._table), step.order, entered.ravel())
+        expected = np.empty((2, directions.size))
+        extrapolate(_flat(self._directions), step.weights, *expected)
+        append(_flat(self._directions), step.order, directions.ravel() - expected[0])
+        first = 0 if moved > _MOVES * root_mean_square(local_error) else 1
+        largest = separate(first, self._table, self._directions, self._amounts)
         if max(largest) > _LOST:  # it would grow until it overflows
             part = _LOST / np.maximum(largest, _LOST)
             self._table *= part
             self._amounts *= part
-
-    @property
-    def _flat(self) -> Array:
-        return self._table.reshape(len(self._table), -1)
 
     def _grow_older(self, jacobian: Jacobian) -> None:
         """Count the steps with a Jacobian."""

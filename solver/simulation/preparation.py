@@ -17,7 +17,7 @@ import numpy as np
 from solver.analysis.diagnostics import measures
 from solver.compilation import CompiledElsewhereError, without_waiting
 from solver.integrators.backward_differences import ROWS, append, extrapolate, interpolant, rescaling
-from solver.integrators.propagated_error import PropagatedError, complete_source, end_step
+from solver.integrators.propagated_error import PropagatedError, complete_source, separate
 from solver.membrane.geometry import Geometry
 from solver.membrane.inclination import inclination_by_angle
 from solver.motion.equation import Motion
@@ -96,7 +96,7 @@ def _parts(scene: Scene) -> list[Callable[[], object]]:
             directions = np.zeros((ROWS, 1 + membranes.count, state.size))
             errors, error = np.zeros((ROWS, state.size, 2)), np.zeros((state.size, 2))
             complete_source(1.0, state, 1.0, error, error.copy())
-            end_step(1, error, directions[0], 0, errors, directions, np.zeros((1 + membranes.count, 2)))
+            separate(0, errors, directions, np.zeros((1 + membranes.count, 2)))
             PropagatedError(equation.rate, error, directions).interpolant(1, 0.0, 1.0)
 
     parts: list[Callable[[], object]] = [
