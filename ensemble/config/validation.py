@@ -57,10 +57,29 @@ def validated(
     context = {} if units is None else {UNITS: validated(Units, units)}
     try:
         if isinstance(model, TypeAdapter):
-            return model.validate_python(document, context=context)
-        return model.model_validate(document, context=context)
+            found = model.validate_python(document, context=context)
+        else:
+            found = model.model_validate(document, context=context)
     except ValidationError as error:
         raise ValueError(explain(error, document) + _suggestions(error, model)) from error
+    _refuse_truth_for_numbers(document, found)
+    return found
+
+
+def _refuse_truth_for_numbers(given: Any, found: Any, location: Location = ()) -> None:
+    """Refuse true and false where something else was made of them: pydantic takes them for 1 and 0."""
+    if isinstance(given, bool):
+        if isinstance(found, int | float) and not isinstance(found, bool):
+            raise ValueError(f"{dotted(location)}: {str(given).lower()} — input should be a number")
+    elif isinstance(given, Mapping) and isinstance(found, tuple):  # one table stands for an array with it
+        for made in found:
+            _refuse_truth_for_numbers(given, made, location)
+    elif isinstance(given, Mapping):
+        for name, value in given.items():
+            _refuse_truth_for_numbers(value, getattr(found, str(name), None), (*location, str(name)))
+    elif isinstance(given, list | tuple) and isinstance(found, list | tuple):
+        for index, (value, made) in enumerate(zip(given, found, strict=False)):
+            _refuse_truth_for_numbers(value, made, (*location, index))
 
 
 def nearest(name: str, names: Iterable[str]) -> str | None:

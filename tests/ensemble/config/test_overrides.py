@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import copy
+import re
 from typing import Any
 
 import pytest
 from pydantic import ValidationError
 
+from ensemble.config.documents import preset_document
 from ensemble.config.dotted_paths import locations
 from ensemble.config.overrides import LONGEST_NAME, override, parse_override
-from ensemble.config.validation import explain
+from ensemble.config.study import Study
+from ensemble.config.validation import explain, validated
 from solver.scene import Scene
 
 DOUBLET: dict[str, Any] = {
@@ -117,8 +120,6 @@ def test_locations_of_a_path() -> None:
             "vesicles.0.reduced_area: 1.2 — input should be less than or equal to 1",
         ),
         ({"horizon": -3}, "horizon: -3 — input should be greater than 0"),
-        ({"horizon": True}, "horizon should not be true or false"),
-        ({"vesicles.0.center": [False, 0.0]}, "vesicles.0: center should not be true or false"),
         ({"flow": {"rate": 1.0}}, "flow: needs a kind"),
         (
             {"numerics.points": 8},
@@ -143,6 +144,27 @@ def test_locations_of_a_path() -> None:
 def test_a_refusal_names_field_value_and_allowed_range(changes: dict[str, Any], message: str) -> None:
     assert refusal(changes).startswith(message)
     assert refusal(changes).count(";") == message.count(";")
+
+
+@pytest.mark.parametrize(
+    ("model", "document", "message"),
+    [
+        (Scene, override(DOUBLET, {"horizon": True}), "horizon: true — input should be a number"),
+        (
+            Scene,
+            override(DOUBLET, {"vesicles.0.center": [False, 0.0]}),
+            "vesicles.0.center.0: false — input should be a number",
+        ),
+        (
+            Study,
+            override(preset_document("critical-hamaker"), {"sweep.values": [0.5, True]}),
+            "sweep.values.1: true — input should be a number",
+        ),
+    ],
+)
+def test_true_is_no_number(model: type[Scene] | type[Study], document: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=f"^{re.escape(message)}$"):
+        validated(model, document)
 
 
 def test_an_unknown_kind_of_flow_is_told_the_known_ones() -> None:
