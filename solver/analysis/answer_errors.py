@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -145,27 +145,29 @@ class AnswerErrors(Remembering):
         numbers = np.array([s.number for s in inside])
         wanted = numbers[0] + np.linspace(0, numbers[-1] - numbers[0], _SAMPLES).astype(int)
         chosen = [inside[k] for k in np.unique(np.searchsorted(numbers, wanted))]
-        leads = self._leads([s.time for s in chosen])
-        others = [s.error - np.multiply.outer(s.slope, lead) for s, lead in zip(chosen, leads, strict=True)]
+        times = np.array([first, *(s.time for s in chosen), last])
+        leads = self._leads(times)
+        others = [
+            s.error - np.multiply.outer(s.slope, lead) for s, lead in zip(chosen, leads[1:-1], strict=True)
+        ]
         values = np.array([quantity(s.state) for s in chosen])
         changes = np.array(
             [change_of(quantity, s.state, other) for s, other in zip(chosen, others, strict=True)]
         )
         if not np.all(np.isfinite(changes)):
             return np.inf
-        times = np.array([first, *(s.time for s in chosen), last])
         # To the first and the last of them belong the values next to them.
         columns = np.column_stack([values, changes])
         columns = np.vstack([columns[:1], columns, columns[-1:]])
         mean, *change = np.trapezoid(columns, times, axis=0) / (last - first)
         # A lead changes an average as far as it changes in the turn, which is that of the trajectory y − e.
         apart = 0.5 * (columns[1:, 0] + columns[:-1, 0]) - mean
-        change = change - apart @ np.diff(self._leads(times), axis=0) / (last - first)
+        change = change - apart @ np.diff(leads, axis=0) / (last - first)
         # Errors of opposite signs cancel in an average, but not to the last digit.
         rest = _REST * float(np.abs(changes[:, 0]).mean())
         return float(np.hypot(magnitude(change), rest))
 
-    def _leads(self, times: Sequence[float] | Array) -> Array:
+    def _leads(self, times: Array) -> Array:
         """Return how far ahead in time the errors put the run at times (n,) of the last turn, (n, 2).
 
         It is known at the passages, and taken to change linearly from one to the next.

@@ -181,9 +181,9 @@ class LineOfCenters(RevolutionTracker):
         return math.atan2(y, x)
 
     def _offset(self, state: Array) -> list[float]:
-        first = self.membranes.count * self.membranes.points
+        coordinates = self.membranes.center_coordinates(state).tolist()
         if self.membranes.count == 1:  # the other vesicle is the image
-            x, y = state[first : first + 2].tolist()
+            x, y = coordinates
             return [-2 * x, -2 * y]
-        x, other_x, y, other_y = state[first : first + 4].tolist()
+        x, other_x, y, other_y = coordinates
         return [other_x - x, other_y - y]

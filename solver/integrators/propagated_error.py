@@ -98,7 +98,6 @@ class Evaluation(NamedTuple):
 class _Deviation:
     """What a Jacobian leaves out: a rate for one direction, nothing for those orthogonal to it."""
 
-    jacobian: Jacobian
     direction: Array
     rate: Array
 
@@ -152,16 +151,8 @@ def amounts_along(directions: Array, errors: Array, first: int = 0) -> Array:
 
 
 @compiled
-def add_along(directions: Array, amounts: Array, table: Array) -> None:
-    """Add parts of directions to a table of errors.
-
-    Parameters
-    ----------
-    directions : (rows, m, n)
-    amounts : (m, 2)
-        Of each direction, by error.
-    table : (rows, n, 2), changed
-    """
+def _add_along(directions: Array, amounts: Array, table: Array) -> None:
+    """Add amounts (m, 2) of directions (rows, m, n) to a table (rows, n, 2)."""
     for row in range(table.shape[0]):
         for k in range(amounts.shape[0]):
             for i in range(table.shape[1]):
@@ -219,7 +210,7 @@ def separate(first: int, table: Array, directions: Array, amounts: Array) -> tup
         for column in range(2):
             more[k, column] = amounts[k, column] if k < first else -found[k, column]
             amounts[k, column] -= more[k, column]
-    add_along(directions, more, table)
+    _add_along(directions, more, table)
     first_largest = second_largest = 0.0
     for i in range(size):
         first_whole, second_whole = table[0, i, 0], table[0, i, 1]
@@ -251,9 +242,7 @@ class PropagatedError:
         When the integration begins.  The signs depend on it: parts of a run that begin alike draw others.
     """
 
-    def __init__(
-        self, rate: Callable[[Array], Array], error: Array, directions: Array, begin: float = 0.0
-    ) -> None:
+    def __init__(self, rate: Callable[[Array], Array], error: Array, directions: Array, begin: float) -> None:
         self._rate, self._begin = rate, begin
         self._table = np.zeros((ROWS, *error.shape))  # of the rest of the errors
         self._table[0] = error
@@ -305,7 +294,7 @@ class PropagatedError:
         self._deviation = None
         if saved["deviation"]:
             direction, rate = saved["deviation"]
-            self._deviation = _Deviation(jacobian, direction, rate)
+            self._deviation = _Deviation(direction, rate)
 
     def advance(
         self, step: LinearizedStep, directions: Array, local_error: Array, remainder: Array, near: Evaluation
@@ -357,7 +346,7 @@ class PropagatedError:
     def _whole(self, rows: int) -> Array:
         """Return the first rows of the table of the whole errors, (rows, n, 2)."""
         whole = self._table[:rows].copy()
-        add_along(self._directions[:rows], self._amounts, whole)
+        _add_along(self._directions[:rows], self._amounts, whole)
         return whole
 
     def _sign(self) -> float:
@@ -374,7 +363,7 @@ class PropagatedError:
             rate = (near.rate - self._rate(near.state - scale * error)) / scale
         except ArithmeticError:
             return None
-        return _Deviation(jacobian, error, rate - jacobian @ error)
+        return _Deviation(error, rate - jacobian @ error)
 
     def rescale(self, order: int, matrix: Array, left_out: Array) -> None:
         """Change the step size.

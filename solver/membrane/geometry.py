@@ -194,9 +194,23 @@ class Membranes:
         (..., M, 2)
             A view.
         """
+        coordinates = self.center_coordinates(state)
+        return coordinates.reshape(*state.shape[:-1], 2, self.count).swapaxes(-1, -2)
+
+    def center_coordinates(self, state: Array) -> Array:
+        """Return the coordinates of the centers in states, as they lie there.
+
+        Parameters
+        ----------
+        state : (..., state_size)
+
+        Returns
+        -------
+        (..., 2·M)
+            All x, then all y; a view.
+        """
         first = self.count * self.points
-        placed = state[..., first : first + 2 * self.count]  # a clock may follow
-        return placed.reshape(*state.shape[:-1], 2, self.count).swapaxes(-1, -2)
+        return state[..., first : first + 2 * self.count]  # a clock may follow
 
     def curve_tangent_angle(self, state: Array) -> Array:
         """Return the tangent angles of all curves.

@@ -97,7 +97,7 @@ def _parts(scene: Scene) -> list[Callable[[], object]]:
             errors, error = np.zeros((ROWS, state.size, 2)), np.zeros((state.size, 2))
             complete_source(1.0, state, 1.0, error, error.copy())
             separate(0, errors, directions, np.zeros((1 + membranes.count, 2)))
-            PropagatedError(equation.rate, error, directions).interpolant(1, 0.0, 1.0)
+            PropagatedError(equation.rate, error, directions, 0.0).interpolant(1, 0.0, 1.0)
 
     parts: list[Callable[[], object]] = [
         lambda: equation.rate(state),
